@@ -14,7 +14,10 @@ ALIKE = 1e-9
 class Told(Protocol):
     """Something that is said of a place in a scene."""
 
-    where: str
+    @property
+    def where(self) -> str:
+        """Place."""
+        ...
 
     @property
     def kind(self) -> Hashable:

@@ -9,7 +9,15 @@ from itertools import groupby
 import numpy as np
 
 from bilayer_core.model.immersed import add_fluid
-from bilayer_core.model.laminate_section import LayerHalves, WholeSection, layer_halves, side
+from bilayer_core.model.laminate_section import (
+    Cells,
+    LayerCells,
+    WholeSection,
+    cells_of,
+    driven_cells,
+    layer_cells,
+    side,
+)
 from bilayer_core.model.lit_elements import add_lit_elements, is_light
 from bilayer_core.model.section import Section, outline, sections
 from bilayer_core.model.strand_arrays import StrandArrays
@@ -43,7 +51,7 @@ class _Placed:
     """A layer at the middle of edges; shapes (n_edge,)."""
 
     section: Section
-    present: Array
+    present: Array  # part of the edge that it covers
     length: Array  # of its middle at the start [m]
     height: Array  # of its middle over the path [m]
 
@@ -72,11 +80,12 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
     nodes = np.arange(stations_of(rod)[1] + 1)
     place = stacked(copy.place for copy in copies)
     shape = strand_shape(rod, np.full(len(nodes), axis), 0, nodes[-1], place)
-    halves = [
-        layer_halves(scene, rod, slot, axis, shape, layer.length / shape.lengths, layer.present)
+    cells = cells_of(rod, int(nodes[-1]))
+    parts = [
+        layer_cells(scene, rod, slot, axis, shape, layer.length / shape.lengths, cells)
         for slot, layer in enumerate(layers)
     ]
-    whole = WholeSection(scene, rod, halves, shape)
+    whole = WholeSection(scene, rod, parts, cells, shape)
     low, high = _faces(rod, axis)
     strands = _strands(found, copies, axis, shape, (low, high))
     mass, centre = sum(layer.mass for layer in layers), _mass_centre(rod, layers, axis)
@@ -108,7 +117,7 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
     coupling = whole.strain_coupling()
     coupled = coupling.any(axis=-1) & (joints >= 0)
     found.add(coupled_joint=joints[coupled], strain_coupling=coupling[coupled])
-    _add_eigenstrain(found, scene, rod, whole, halves, strands, axis, joints)
+    _add_eigenstrain(found, scene, rod, whole, parts, cells, strands, axis, joints)
     add_fluid(found, scene.fluid, rod, found.rods[-len(copies) :])
 
 
@@ -163,9 +172,8 @@ def _layers_in_place(scene: SceneConfig, rod: Rod) -> list[_Placed]:
     for slot, (layer, lengths) in enumerate(
         zip(rod.layers, strand_lengths(rod, np.array(heights), last_node), strict=True)
     ):
-        first, last = rod.covered_stations(layer)
         section = sections(rod, layer, scene.materials[layer.material], edges + 0.5)
-        present = (first <= own) & (own < last)
+        present = rod.covered_parts(own, layer)
         layers.append(_Placed(section, present, lengths, side(rod, slot) * section.thickness))
     return layers
 
@@ -175,8 +183,11 @@ def _axis(layers: list[_Placed]) -> float:
 
     B = 0 there: Σ (EA/λ) (y − y₀) = 0 with λ in proportion to the layers' lengths, whatever y₀ is.
     """
-    there = _prevailing(np.array([layer.present for layer in layers]))
-    weight = [(layer.present * layer.section.axial_stiffness / layer.length)[there] for layer in layers]
+    present = np.array([layer.present >= 0.5 for layer in layers])
+    there = _prevailing(present)
+    weight = [
+        (own * layer.section.axial_stiffness / layer.length)[there] for own, layer in zip(present, layers, strict=True)
+    ]
     moment = sum(np.vdot(w, layer.height[there]) for w, layer in zip(weight, layers, strict=True))
     return float(moment / np.sum(weight))
 
@@ -208,8 +219,18 @@ def _middle(rod: Rod, axis: float) -> Array:
 
 
 def _faces(rod: Rod, axis: float) -> tuple[Array, Array]:
-    """Heights of the two faces over the curve at each node [m]."""
-    _, layers = outline(rod, np.arange(stations_of(rod)[1] + 1))
+    """Heights of the two faces over the curve at each node [m].
+
+    Beyond the end of a layer its thickness falls to 0 within the length of an edge, so that they depend on where the
+    layer ends, and not only on the nearest station.
+    """
+    stations = rod.on_path(np.arange(stations_of(rod)[1] + 1))
+    spans = [rod.span_of(layer) for layer in rod.layers]
+    layers = [
+        values_at(layer.thickness, rod.edge_length * stations)
+        * np.clip(1.0 + np.minimum(stations - first, last - stations), 0.0, 1.0)
+        for layer, (first, last) in zip(rod.layers, spans, strict=True)
+    ]
     if len(layers) == 1:
         return -0.5 * layers[0] - axis, 0.5 * layers[0] - axis
     return -layers[0] - axis, layers[1] - axis
@@ -267,7 +288,8 @@ def _add_eigenstrain(
     scene: SceneConfig,
     rod: Rod,
     whole: WholeSection,
-    halves: list[LayerHalves],
+    parts: list[LayerCells],
+    cells: Cells,
     strands: list[StrandArrays],
     axis: float,
     joints: Array,
@@ -279,21 +301,22 @@ def _add_eigenstrain(
     first_edge = np.array([[strand.first_edge] for strand in strands])
     of_edges: list[tuple[Array, ...]] = []
     of_joints: list[tuple[Array, ...]] = []
-    followed = [(layer, law, half) for layer, half in zip(rod.layers, halves, strict=True) for law in layer.eigenstrain]
-    for layer, law, half in followed:
-        edges = np.array(rod.driven_edges(layer, law))
+    followed = [(layer, law, part) for layer, part in zip(rod.layers, parts, strict=True) for law in layer.eigenstrain]
+    for layer, law, part in followed:
+        edges, covered = np.array(rod.driven_edges(layer, law)), driven_cells(rod, cells, layer, law)
         if is_light(scene, law):
             heights = np.full(rod.stations - 1, axis)
-            laws = add_lit_elements(found, scene, rod, layer, law, strands[0].first_edge, heights)
+            laws = add_lit_elements(found, scene, rod, layer, law, edges, strands[0].first_edge, heights)
             groups = [
                 (number, with_copies(rod, own)) for number, own in zip(laws.tolist(), edges[:, None], strict=True)
             ]
         else:
             groups = [(found.law(scene, law), with_copies(rod, edges))]
         for number, driven in groups:
-            weight, nodes, bend = whole.driven(half, driven)
+            weight, bend = whole.driven(part, covered & np.isin(cells.edge, driven))
+            weight = weight[:, driven]
             of_edges.append((first_edge + driven, np.full(weight.shape, number), weight))
-            of_joints.append((joints[:, nodes], np.full(bend.shape, number), bend))
+            of_joints.append((joints, np.full(bend.shape, number), bend))
     if not of_edges:
         return
     edge, law_of_edge, weight = (np.concatenate(part, axis=1) for part in zip(*of_edges, strict=True))

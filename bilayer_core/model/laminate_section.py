@@ -28,6 +28,16 @@ rod; where a layer begins or ends the axis is elsewhere, and `forces.bend_twist`
 fluid act where they are, off the curve (`forces.raised`).
 
 Across the width and in twist 1/K = Σ ℓ/EI₂ and Σ ℓ/GJ likewise.
+
+Where a layer, a law or a piece of a profile ends within a half, the half consists of *cells*, of the parts f of its
+length. They bend in series, under one force and one moment: with the section's matrix S of (ε, χ′), S = ((A, −B),
+(−B, D)), and its load p = (N, M̄ − M), strains without stress S⁻¹ p and compliances add,
+
+    S⁻¹ = Σ f S_cell⁻¹,   p = S Σ f S_cell⁻¹ p_cell
+
+and so do 1/EI₂, 1/GJ and τ̄. Both halves of an edge in which a layer or a law ends are alike, from the cells of the
+whole edge: they have one ε, which unlike halves would fight for. So a patch turns its strip by its length times its
+curvature, at any number of stations.
 """
 
 from __future__ import annotations
@@ -38,9 +48,11 @@ import numpy as np
 
 from bilayer_core.model.section import bond, sections
 from bilayer_core.model.strands import StrandShape
+from bilayer_core.model.unknown_order import ReadOnlyArrays
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.scene.profile import values_at
-from bilayer_core.scene.rod import Rod
+from bilayer_core.scene.eigenstrain import Eigenstrain
+from bilayer_core.scene.profile import Profile, means_between
+from bilayer_core.scene.rod import Layer, Rod
 
 Array = np.ndarray
 ON_AXIS = 1e-12
@@ -53,12 +65,85 @@ def side(rod: Rod, slot: int) -> float:
 
 
 @dataclass(frozen=True)
-class LayerHalves:
-    """A layer in the halves of all edges of a rod, each in the middle of its half; shapes (n_edge, 2), or (n_copy,
-    n_edge, 2) where copies of the rod differ. What the layer contributes is 0 where it is not.
+class Cells(ReadOnlyArrays):
+    """The halves of all edges of a rod, cut where a layer, a law or a piece of a profile begins or ends."""
+
+    begin: Array  # in stations, shape (n_cell,)
+    end: Array
+    half: Array  # the half in which it lies, shape (n_cell,)
+    blended: Array  # edges in which a layer or a law ends, whose halves are alike, shape (n_edge,)
+
+    @property
+    def edge(self) -> Array:
+        """Edge of each cell, shape (n_cell,)."""
+        return self.half // 2
+
+    @property
+    def middle(self) -> Array:
+        """Its middle, in stations, shape (n_cell,)."""
+        return 0.5 * (self.begin + self.end)
+
+    @property
+    def is_cut(self) -> bool:
+        """True if not each of them is a half, or if halves are blended."""
+        return len(self.half) > 2 * len(self.blended) or bool(self.blended.any())
+
+    def means(self, values: Array) -> Array:
+        """Return the means over halves of values in cells, shapes (..., n_cell) and (..., n_edge, 2)."""
+        if not self.is_cut:
+            return values.reshape(*values.shape[:-1], -1, 2)
+        first = np.searchsorted(self.half, np.arange(2 * len(self.blended)))
+        means = np.add.reduceat(2.0 * (self.end - self.begin) * values, first, axis=-1)
+        means = means.reshape(*means.shape[:-1], -1, 2)
+        return np.where(self.blended[:, None], means.mean(axis=-1, keepdims=True), means)
+
+
+def cells_of(rod: Rod, edges: int) -> Cells:
+    """Return the cells of so many edges of a rod."""
+    ends = [
+        station for layer in rod.layers for law in (None, *layer.eigenstrain) for station in rod.span_of(layer, law)
+    ]
+    varying = [rod.width, *(part for layer in rod.layers for part in _varying(layer))]
+    places = [place / rod.edge_length for profile in varying if isinstance(profile, Profile) for place in profile.at]
+    grid, (ends, places) = 0.5 * np.arange(2 * edges + 1), (_on_rod(rod, part, edges) for part in (ends, places))
+    blended = np.zeros(edges, dtype=bool)
+    blended[np.floor(ends[np.abs(ends - np.rint(ends)) > SMALLEST]).astype(np.int64)] = True
+    cuts = np.concatenate([ends, places])
+    near = np.abs(grid[np.rint(2.0 * cuts).astype(np.int64)] - cuts) <= SMALLEST
+    grid = np.unique(np.concatenate([grid, cuts[~near]]))
+    return Cells(grid[:-1], grid[1:], np.floor(grid[:-1] + grid[1:]).astype(np.int64), blended)
+
+
+def _on_rod(rod: Rod, stations: list[float], edges: int) -> Array:
+    """Return the inner ones of some stations, with their copies on so many edges of a closed rod."""
+    inside = np.array([station for station in stations if 0.0 < station < rod.stations - 1], dtype=float)
+    if rod.closed:
+        inside = np.concatenate([inside, inside + (rod.stations - 1)])
+    return inside[inside < edges]
+
+
+SMALLEST = 1e-6
+"""Of an edge: an end as near as this to the end of a half is there."""
+
+
+def _varying(layer: Layer) -> tuple[float | Profile | None, ...]:
+    """Return what may vary along a layer."""
+    return layer.thickness, layer.stiffness, layer.natural_curvature, layer.natural_twist
+
+
+def driven_cells(rod: Rod, cells: Cells, layer: Layer, law: Eigenstrain | None = None) -> Array:
+    """Return which cells a layer covers, or a law of it drives, shape (n_cell,)."""
+    (first, last), middle = rod.span_of(layer, law), rod.on_path(cells.middle)
+    return (first < middle) & (middle < last)
+
+
+@dataclass(frozen=True)
+class LayerCells:
+    """A layer in the cells of a rod, each in its middle; shapes (n_cell,), or (n_copy, n_cell) where copies of the rod
+    differ. What the layer contributes is 0 where it is not.
     """
 
-    ratio: Array  # λ, of both halves, shape (n_copy, n_edge, 1)
+    ratio: Array  # λ
     axial: Array  # EA [N]
     stretch: Array  # EA/λ
     bend: Array  # EI₁/λ [N m²]
@@ -69,60 +154,48 @@ class LayerHalves:
     height: Array  # z [m]
 
 
-def layer_halves(
-    scene: SceneConfig, rod: Rod, slot: int, axis: float, shape: StrandShape, stretch: Array, present: Array
-) -> LayerHalves:
-    """Return a layer in the halves of edges; `stretch` is λ, shape (n_copy, n_edge)."""
+def layer_cells(
+    scene: SceneConfig, rod: Rod, slot: int, axis: float, shape: StrandShape, stretch: Array, cells: Cells
+) -> LayerCells:
+    """Return a layer in the cells of a rod; `stretch` is λ of edges, shape (n_copy, n_edge)."""
     layer = rod.layers[slot]
-    stations = _of_halves(len(present))
-    section = sections(rod, layer, scene.materials[layer.material], stations)
-    along = rod.edge_length * rod.on_path(stations)
-
-    def halves(values: Array) -> Array:
-        return present[:, None] * values.reshape(-1, 2)
-
-    ratio = stretch[..., None]
-    bend, across = (halves(stiffness) / ratio for stiffness in section.bending_stiffness)
-    twist = halves(section.twisting_stiffness)
+    section = sections(rod, layer, scene.materials[layer.material], cells.middle)
+    begin = rod.edge_length * rod.on_path(cells.begin)
+    end = begin + rod.edge_length * (cells.end - cells.begin)
+    present, ratio = driven_cells(rod, cells, layer), stretch[..., cells.edge]
+    bend, across = (present * stiffness / ratio for stiffness in section.bending_stiffness)
+    twist = present * section.twisting_stiffness
     moment = np.zeros_like(bend)
     if layer.natural_curvature is not None:
         start = (shape.strains() - shape.imperfection)[..., 0] / shape.voronoi
-        natural = ratio * values_at(layer.natural_curvature, along).reshape(-1, 2)
-        moment = bend * (natural - np.stack([start[..., :-1], start[..., 1:]], axis=-1))
-    return LayerHalves(
+        natural = ratio * means_between(layer.natural_curvature, begin, end)
+        moment = bend * (natural - start[..., (cells.half + 1) // 2])
+    return LayerCells(
         ratio=ratio,
-        axial=halves(section.axial_stiffness),
-        stretch=halves(section.axial_stiffness) / ratio,
+        axial=present * section.axial_stiffness,
+        stretch=present * section.axial_stiffness / ratio,
         bend=bend,
         across=across,
         twist=twist / ratio,
-        twist_moment=np.asarray(shape.handedness)[:, None, None]
-        * twist
-        * values_at(layer.natural_twist, along).reshape(-1, 2),
+        twist_moment=np.asarray(shape.handedness)[:, None] * twist * means_between(layer.natural_twist, begin, end),
         natural_moment=moment,
-        height=side(rod, slot) * section.thickness.reshape(-1, 2) - axis,
+        height=side(rod, slot) * section.thickness - axis,
     )
 
 
-def _of_halves(edges: int) -> Array:
-    """Stations in the middle of the halves of so many edges, shape (2 n_edge,)."""
-    return (np.arange(edges)[:, None] + [0.25, 0.75]).ravel()
-
-
-def _bond_twist(scene: SceneConfig, rod: Rod, halves: list[LayerHalves]) -> Array | float:
-    """k_φ c²/λ where both layers are [N m²], λ the mean of theirs, shape (n_copy, n_edge, 2)."""
-    if len(halves) == 1:
+def _bond_twist(scene: SceneConfig, rod: Rod, layers: list[LayerCells], cells: Cells) -> Array | float:
+    """k_φ c²/λ where both layers are [N m²], λ the mean of theirs, shape (n_copy, n_cell)."""
+    if len(layers) == 1:
         return 0.0
-    stations = _of_halves(len(halves[0].axial))
 
     def made() -> Array:
-        bottom, top = (sections(rod, layer, scene.materials[layer.material], stations) for layer in rod.layers)
+        bottom, top = (sections(rod, layer, scene.materials[layer.material], cells.middle) for layer in rod.layers)
         law = bond(bottom, top, scene.coupling, rod.torsion)
-        return (law.tilt * (0.5 * (bottom.thickness + top.thickness)) ** 2).reshape(-1, 2)
+        return law.tilt * (0.5 * (bottom.thickness + top.thickness)) ** 2
 
     stiffness = scene.keep("twist of bonds", (rod,), made)
-    bonded = (halves[0].axial > 0.0) & (halves[1].axial > 0.0)
-    return bonded * stiffness / (0.5 * (halves[0].ratio + halves[1].ratio))
+    bonded = (layers[0].axial > 0.0) & (layers[1].axial > 0.0)
+    return bonded * stiffness / (0.5 * (layers[0].ratio + layers[1].ratio))
 
 
 class WholeSection:
@@ -130,31 +203,58 @@ class WholeSection:
 
     Attributes
     ----------
-    bending, coupling : Array
-        D [N m²] and B [N m] of halves, shape (n_copy, n_edge, 2).
     axial_stiffness, rest_strain : Array
         A* [N] and N*/A* of edges, shape (n_copy, n_edge).
     joint_stiffness, joint_rest : Array
         [N m] and κ̄₁ κ̄₂ ψ̄ [rad] at all nodes, shape (n_copy, n_node, 3).
     """
 
-    def __init__(self, scene: SceneConfig, rod: Rod, halves: list[LayerHalves], shape: StrandShape):
-        stretch = sum(half.stretch for half in halves)
-        coupling = sum(half.stretch * half.height for half in halves)
-        self.bending = sum(half.bend + half.stretch * half.height**2 for half in halves)
-        self.coupling = np.where(np.abs(coupling) <= ON_AXIS * np.sqrt(stretch * self.bending), 0.0, coupling)
-        self._half_length = 0.5 * shape.lengths[..., None]
-        moment = sum(half.natural_moment for half in halves)
-        twist = sum(half.twist for half in halves) + _bond_twist(scene, rod, halves)
+    def __init__(self, scene: SceneConfig, rod: Rod, layers: list[LayerCells], cells: Cells, shape: StrandShape):
+        self._cells, self._half_length = cells, 0.5 * shape.lengths[..., None]
+        stretch = sum(layer.stretch for layer in layers)
+        coupling = sum(layer.stretch * layer.height for layer in layers)
+        bending = sum(layer.bend + layer.stretch * layer.height**2 for layer in layers)
+        coupling = np.where(np.abs(coupling) <= ON_AXIS * np.sqrt(stretch * bending), 0.0, coupling)
+        self._of_cells = stretch, coupling, bending
+        self._of_halves = self._in_series(stretch, coupling, bending)
+        stretch, coupling, bending = self._of_halves
+        moment = self._loads(0.0 * sum(layer.bend for layer in layers), sum(layer.natural_moment for layer in layers))
+        twist = sum(layer.twist for layer in layers) + _bond_twist(scene, rod, layers, cells)
 
-        self.axial_stiffness = np.mean(stretch - self.coupling**2 / self.bending, axis=-1)
-        self.rest_strain = np.mean(self.coupling * moment / self.bending, axis=-1) / self.axial_stiffness
-        across = sum(half.across for half in halves)
-        flexibility = [self.to_nodes(1.0 / stiffness) for stiffness in (self.bending, across, twist)]
-        self.joint_stiffness = 1.0 / np.stack(flexibility, axis=-1)
+        self.axial_stiffness = np.mean(stretch - coupling**2 / bending, axis=-1)
+        self.rest_strain = self._rest_strains(*moment) / self.axial_stiffness
+        across = sum(layer.across for layer in layers)
+        flexibility = [1.0 / bending, cells.means(1.0 / across), cells.means(1.0 / twist)]
+        self.joint_stiffness = 1.0 / np.stack([self.to_nodes(part) for part in flexibility], axis=-1)
         self.joint_rest = shape.strains()
-        self.joint_rest[..., 0] += self.to_nodes(moment / self.bending)
-        self.joint_rest[..., 2] += self.to_nodes(sum(half.twist_moment for half in halves) / twist)
+        self.joint_rest[..., 0] += self.to_nodes(moment[1] / bending)
+        self.joint_rest[..., 2] += self.to_nodes(cells.means(sum(layer.twist_moment for layer in layers) / twist))
+
+    def _in_series(self, stretch: Array, coupling: Array, bending: Array) -> tuple[Array, Array, Array]:
+        """Return A, B and D of halves from those of their cells, shapes (n_copy, n_edge, 2)."""
+        if not self._cells.is_cut:
+            return tuple(self._cells.means(part) for part in (stretch, coupling, bending))
+        size = stretch * bending - coupling**2
+        flexible = [self._cells.means(part / size) for part in (bending, coupling, stretch)]
+        size = flexible[0] * flexible[2] - flexible[1] ** 2
+        coupled = np.where(np.abs(flexible[1]) <= ON_AXIS * np.sqrt(flexible[0] * flexible[2]), 0.0, flexible[1])
+        return flexible[2] / size, coupled / size, flexible[0] / size
+
+    def _loads(self, force: Array, moment: Array) -> tuple[Array, Array]:
+        """Return p of halves from that of their cells [N, N m], shapes (n_copy, n_edge, 2)."""
+        if not self._cells.is_cut:
+            return self._cells.means(force), self._cells.means(moment)
+        stretch, coupling, bending = self._of_cells
+        size = stretch * bending - coupling**2
+        strain = self._cells.means((bending * force + coupling * moment) / size)
+        curvature = self._cells.means((coupling * force + stretch * moment) / size)
+        stretch, coupling, bending = self._of_halves
+        return stretch * strain - coupling * curvature, bending * curvature - coupling * strain
+
+    def _rest_strains(self, force: Array, moment: Array) -> Array:
+        """Return N* of edges from the p of their halves [N], shape (n_copy, n_edge)."""
+        _, coupling, bending = self._of_halves
+        return np.mean(force + coupling * moment / bending, axis=-1)
 
     def to_nodes(self, per_length: Array) -> Array:
         """Integrals at nodes of what halves have per length, shape (n_copy, n_node)."""
@@ -162,24 +262,20 @@ class WholeSection:
 
     def strain_coupling(self) -> Array:
         """b of the edges before and after each node [rad], shape (n_copy, n_node, 2)."""
-        slope = self._half_length * self.coupling / self.bending
+        _, coupling, bending = self._of_halves
+        slope = self._half_length * coupling / bending
         pairs = np.zeros((len(slope), slope.shape[1] + 1, 2))
         pairs[:, 1:, 0], pairs[:, :-1, 1] = slope[..., 1], slope[..., 0]
         return pairs
 
-    def driven(self, half: LayerHalves, edges: Array) -> tuple[Array, Array, Array]:
-        """Per eigenstrain of a layer on some edges: their rest strains, N*/A*, shape (n_copy, n_driven), the nodes at
-        their ends, shape (n_end,), and κ̄₁ of these nodes, −Σ ℓ M/D [rad], shape (n_copy, n_end).
+    def driven(self, layer: LayerCells, driven: Array) -> tuple[Array, Array]:
+        """Per eigenstrain of a layer in some cells, shape (n_cell,): rest strains N*/A* of all edges, shape (n_copy,
+        n_edge), and κ̄₁ of all nodes, −Σ ℓ M/D [rad], shape (n_copy, n_node).
         """
-        axial, height = half.axial[edges], half.height[edges]
-        bending, coupling = self.bending[:, edges], self.coupling[:, edges]
-        part = np.mean(axial * (1.0 - coupling * height / bending), axis=-1) / self.axial_stiffness[:, edges]
-        of_halves = -self._half_length[:, edges] * (axial * height / bending)
-        if len(edges) and edges[-1] - edges[0] == len(edges) - 1 and np.all(edges[1:] - edges[:-1] == 1):
-            return part, np.arange(edges[0], edges[-1] + 2), _at_nodes(of_halves)  # as they mostly are
-        nodes, slot = np.unique(np.stack([edges, edges + 1], axis=1), return_inverse=True)
-        sums = [np.bincount(slot.ravel(), weights=own.ravel(), minlength=len(nodes)) for own in of_halves]
-        return part, nodes, np.array(sums)
+        axial = driven * layer.axial * np.ones_like(layer.ratio)
+        force, moment = self._loads(axial, -axial * layer.height)
+        part = self._rest_strains(force, moment) / self.axial_stiffness
+        return part, self.to_nodes(moment / self._of_halves[2])
 
 
 def _at_nodes(of_halves: Array) -> Array:

@@ -27,18 +27,26 @@ def is_light(scene: SceneConfig, law: Eigenstrain) -> bool:
 
 
 def add_lit_elements(
-    found: Collected, scene: SceneConfig, rod: Rod, layer: Layer, law: Eigenstrain, first_edge: int, axis: Array
+    found: Collected,
+    scene: SceneConfig,
+    rod: Rod,
+    layer: Layer,
+    law: Eigenstrain,
+    edges: Array,
+    first_edge: int,
+    axis: Array,
 ) -> Array:
     """Add what a light reaches of a layer, and laws for it, one an edge that the law drives: their numbers.
 
     Parameters
     ----------
+    edges : Array
+        Edges of the path that the law drives, shape (n_driven,).
     first_edge : int
         Of the strand, as if that began with the path.
     axis : Array
         Height of the strand over the path in the middle of each edge of the path [m].
     """
-    edges = np.array(rod.driven_edges(layer, law))
     numbers = found.laws_of_elements(scene, law, len(edges))
     slot = rod.layers.index(layer)
     _, thickness = outline(rod, edges + 0.5)

@@ -15,6 +15,7 @@ from bilayer_core.model.laminate import uneven_faces
 from bilayer_core.model.planarity import find_plane, require_plane
 from bilayer_core.model.redundancy import redundant_joints, require_possible_motion
 from bilayer_core.model.rod_pairs import RodPair, passing_warnings, rod_pairs
+from bilayer_core.model.rods import snapped_layers
 from bilayer_core.model.twisted import HELIX, helix_error, twist_figures
 from bilayer_core.model.validity import Figure, validity_warnings
 from bilayer_core.scene.config import Coupling, SceneConfig
@@ -116,6 +117,8 @@ def _warnings_of(scene: SceneConfig, model: str, dimension: int) -> Iterator[Fig
     """Warnings that depend on the model."""
     yield from (figure for figure in twist_figures(scene, model, dimension) if figure.outside)
     yield from redundant_joints(scene, require_plane(scene) if dimension == 2 else None)
+    if model == "two_rod":
+        yield from snapped_layers(scene)
     if model == "laminate":
         in_contact = {rod for pair in rod_pairs(scene) if pair.active for rod in (pair.first, pair.second)}
         yield from (figure for rod in sorted(in_contact) for figure in uneven_faces(scene.rods[rod], scene))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,8 +22,10 @@ from bilayer_core.model.strands import (
     strand_shape,
     with_copies,
 )
+from bilayer_core.model.validity import Figure
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.scene.profile import values_at
+from bilayer_core.scene.eigenstrain import Eigenstrain
+from bilayer_core.scene.profile import means_between
 from bilayer_core.scene.rod import Layer, Rod, RodCopy
 
 Array = np.ndarray
@@ -68,6 +71,29 @@ def _add_copy(found: Collected, scene: SceneConfig, copy: RodCopy, body_index: d
     add_fluid(found, scene.fluid, rod, found.rods[-1:])
     if len(strands) == 2:
         _add_bond(found, scene, rod, *strands)
+
+
+def snapped_layers(scene: SceneConfig) -> Iterator[Figure]:
+    """Yield the layers that end between stations, where two rods begin and end at stations."""
+    for rod in scene.rods:
+        for layer in rod.layers:
+            span, stations = rod.span_of(layer), rod.covered_stations(layer)
+            off = rod.edge_length * max(abs(a - b) for a, b in zip(span, stations, strict=True))
+            if off > SNAPPED * rod.path.length:
+                begin, end = (1e3 * rod.edge_length * station for station in stations)
+                yield Figure(
+                    f"rods.{rod.name}.layers.{layer.name}",
+                    "two rods have it",
+                    f"from {begin:.4g} to {end:.4g} mm",
+                    f"interval: from {1e3 * layer.interval[0]:.4g} to {1e3 * layer.interval[1]:.4g} mm",
+                    off,
+                    "its stiffness, mass and natural curvature go from station to station (its eigenstrain has the "
+                    "length of the interval); `model: laminate`, or stations at its ends, have all as they are",
+                )
+
+
+SNAPPED = 1e-6
+"""Of the path: an end as near as this to a station is there."""
 
 
 @dataclass(frozen=True)
@@ -118,11 +144,18 @@ def _elements(
 def _rest(rod: Rod, layer: Layer, shape: StrandShape) -> Array:
     """κ̄₁ κ̄₂ ψ̄ of a layer at its nodes [rad]: its natural shape, by default that at the start, shape (n_node, 3)."""
     first, last = stations_of(rod, layer)
-    along, voronoi = rod.edge_length * rod.on_path(np.arange(first, last + 1)), shape.voronoi
-    rest = shape.strains()
+    along, rest, voronoi = rod.on_path(np.arange(first, last + 1)), shape.strains(), shape.voronoi
+    begin, end = along - 0.5, along + 0.5
+    if not shape.closed:
+        begin, end = np.maximum(begin, first), np.minimum(end, last)
+    natural = (
+        means_between(part, rod.edge_length * begin, rod.edge_length * end)
+        for part in (0.0 if layer.natural_curvature is None else layer.natural_curvature, layer.natural_twist)
+    )
+    curvature, twist = natural
     if layer.natural_curvature is not None:
-        rest[:, 0] = shape.imperfection[:, 0] + values_at(layer.natural_curvature, along) * voronoi
-    rest[:, 2] += shape.handedness * values_at(layer.natural_twist, along) * voronoi
+        rest[:, 0] = shape.imperfection[:, 0] + curvature * voronoi
+    rest[:, 2] += shape.handedness * twist * voronoi
     return rest
 
 
@@ -131,16 +164,31 @@ def _add_eigenstrain(found: Collected, scene: SceneConfig, rod: Rod, slot: int, 
     layer = rod.layers[slot]
     first_edge = strand.first_edge - strand.first_station
     for law in layer.eigenstrain:
-        edges = np.array(rod.driven_edges(layer, law))
+        edges, weight = _driven(rod, layer, law, strand)
         if is_light(scene, law):
             _, thickness = outline(rod, np.arange(rod.stations - 1) + 0.5)
             axis = 0.0 * thickness[0] if len(rod.layers) == 1 else _OUTWARD[slot] * 0.5 * thickness[slot]
-            laws = add_lit_elements(found, scene, rod, layer, law, first_edge, axis)
+            laws = add_lit_elements(found, scene, rod, layer, law, edges, first_edge, axis)
         else:
             laws = np.full(len(edges), found.law(scene, law))
         driven = with_copies(rod, edges) if strand.closed else edges
-        laws = np.append(laws, laws[edges == 0])[: len(driven)]
-        found.add(driven_edge=first_edge + driven, driven_law=laws, driven_weight=np.ones(len(driven)))
+        laws, weight = (np.append(of, of[edges == 0])[: len(driven)] for of in (laws, weight))
+        found.add(driven_edge=first_edge + driven, driven_law=laws, driven_weight=weight)
+
+
+def _driven(rod: Rod, layer: Layer, law: Eigenstrain, strand: StrandArrays) -> tuple[Array, Array]:
+    """Return the edges of the path that a law drives in a strand, and the part of its eigenstrain that each has.
+
+    A strand goes from station to station. What the law drives beyond its ends, less than half an edge, is added to
+    the last edges, so that the layer grows by as much as the scene says.
+    """
+    first, last = strand.first_station, strand.first_station + strand.shown - 1
+    begin, end = rod.span_of(layer, law)
+    edges = np.arange(first, last)
+    weight = rod.covered_parts(edges, layer, law)
+    weight[0] += max(0.0, min(end, first) - begin)
+    weight[-1] += max(0.0, end - max(begin, last))
+    return edges[weight > 0.0], weight[weight > 0.0]
 
 
 def _add_bond(found: Collected, scene: SceneConfig, rod: Rod, bottom: _Bonded, top: _Bonded) -> None:

@@ -69,14 +69,17 @@ def sections(rod: Rod, layer: Layer, material: Material, stations: Array) -> Sec
 
 def outline(rod: Rod, stations: Array) -> tuple[Array, Array]:
     """Width of a rod and thickness of its layers [m] at stations, which may be whole numbers or lie between; shapes
-    (n_place,) and (n_layer, n_place). Thickness is 0 where a layer is not.
+    (n_place,) and (n_layer, n_place). Thickness is 0 where a layer is not: at stations outside those nearest to its
+    interval, and between two that it covers no part of.
     """
     stations = rod.on_path(stations)
-    along = rod.edge_length * stations
+    along, edges = rod.edge_length * stations, np.floor(stations)
     thickness = np.zeros((len(rod.layers), len(stations)))
     for own, layer in zip(thickness, rod.layers, strict=True):
         first, last = rod.covered_stations(layer)
-        own[:] = values_at(layer.thickness, along) * ((first <= stations) & (stations <= last))
+        at_station = (first <= stations) & (stations <= last)
+        there = np.where(edges == stations, at_station, rod.covered_parts(edges, layer) > 0.0)
+        own[:] = values_at(layer.thickness, along) * there
     return values_at(rod.width, along), thickness
 
 

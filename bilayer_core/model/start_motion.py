@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
@@ -28,10 +28,20 @@ from bilayer_core.scene.body import Free, Guided
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.rod import Rod
 
-if TYPE_CHECKING:
-    from bilayer_core.model.state import State
-
 Array = np.ndarray
+
+
+class State(Protocol):
+    """A state, as far as it moves: see `bilayer_core.model.state.State`."""
+
+    position: Array
+    director1: Array
+    velocity: Array
+    spin: Array
+    body_position: Array
+    body_velocity: Array
+    body_angular_velocity: Array
+    strain_rate: Array
 
 
 @dataclass(frozen=True)

@@ -168,7 +168,8 @@ def _eigenstrain_range(scene: SceneConfig, rod: Rod, layer: Layer, laws: tuple[E
     for law in laws:
         channel = scene.stimuli[law.stimulus]
         least, most = np.sort(law.strain_at(np.array([channel.minimum, channel.maximum])))
-        found[:, rod.driven_edges(layer, law)] += np.array([[max(abs(least), abs(most))], [least], [most]])
+        driven = rod.covered_parts(np.arange(rod.stations - 1), layer, law) > 0.0
+        found[:, driven] += np.array([[max(abs(least), abs(most))], [least], [most]])
     return found
 
 

@@ -91,12 +91,11 @@ def _rest_lengths(scene: SceneConfig) -> Iterator[Fault]:
 def _rest_length(scene: SceneConfig, rod: Rod, index: int) -> tuple[float, int, float, str] | None:
     """Least eigenstrain of a layer that leaves it no length, the law to blame for it with its gain, and the demand."""
     layer = rod.layers[index]
-    acting: dict[int, tuple[int, ...]] = {}
-    for place, law in enumerate(layer.eigenstrain):
-        for edge in rod.driven_edges(layer, law):
-            acting[edge] = (*acting.get(edge, ()), place)
+    spans = [rod.span_of(layer, law) for law in layer.eigenstrain]
+    begins = [begin for begin, end in spans if begin < end]
+    acting = {tuple(k for k, (begin, end) in enumerate(spans) if begin <= at < end) for at in begins}
     worst, least = (), -1.0
-    for places in sorted(set(acting.values())):
+    for places in sorted(acting):
         strain = _least_strain(scene, [layer.eigenstrain[place] for place in places])
         if strain <= least:
             worst, least = places, strain

@@ -77,7 +77,7 @@ class Eigenstrain(BaseModel):
     saturation: PositiveNumber | None = None
     """Magnitude that the eigenstrain tends to but does not exceed."""
     interval: tuple[NonNegativeLength, PositiveLength] | None = None
-    """From and to, as lengths along the path [m]: edges whose middle lies between; default: the whole layer."""
+    """From and to, as lengths along the path [m]; default: the whole layer."""
 
     @model_validator(mode="wrap")
     @classmethod

@@ -77,6 +77,25 @@ def values_at(number_or_profile: float | Profile, along: np.ndarray) -> np.ndarr
     return values
 
 
+def means_between(number_or_profile: float | Profile, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Exact means over the spans of a path from `begin` to `end` [m], of the same shape."""
+    if not isinstance(number_or_profile, Profile):
+        return values_at(number_or_profile, begin)
+    at, value = np.array(number_or_profile.at), np.array(number_or_profile.value)
+    areas = np.concatenate([[0.0], np.cumsum(0.5 * (value[1:] + value[:-1]) * np.diff(at))])
+
+    def area(along: np.ndarray) -> np.ndarray:
+        k = np.clip(np.searchsorted(at, along, side="right") - 1, 0, len(at) - 1)
+        inside = np.minimum(np.maximum(along, at[0]), at[-1])
+        return (
+            areas[k]
+            + 0.5 * (value[k] + np.interp(along, at, value)) * (inside - at[k])
+            + (np.minimum(along - at[0], 0.0) * value[0] + np.maximum(along - at[-1], 0.0) * value[-1])
+        )
+
+    return (area(end) - area(begin)) / (end - begin)
+
+
 def extremes(number_or_profile: float | Profile) -> tuple[float, float]:
     """Smallest and largest value."""
     values = number_or_profile.value if isinstance(number_or_profile, Profile) else [number_or_profile]

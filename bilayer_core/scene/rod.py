@@ -39,7 +39,7 @@ Eigenstrains = Annotated[
 
 
 class Layer(Part):
-    """One layer of a rod. It covers the whole path, or the stations nearest to `interval`."""
+    """One layer of a rod. It covers the whole path, or `interval`; two rods have it from station to station."""
 
     name: Name
     """Unique in its rod."""
@@ -186,20 +186,34 @@ class Rod(Part):
         first, last = (math.floor(length / self.edge_length + 0.5) for length in layer.interval)
         return first, last
 
+    def span_of(self, layer: Layer, law: Eigenstrain | None = None) -> tuple[float, float]:
+        """Where `layer`, or a law of it, begins and ends, in stations, of which it may end between two."""
+        first, last = 0.0, float(self.stations - 1)
+        for interval in (layer.interval, None if law is None else law.interval):
+            if interval is not None:
+                begin, end = (_near_whole(length / self.edge_length) for length in interval)
+                first, last = max(first, begin), min(last, end)
+        return first, last
+
+    def covered_parts(self, edges: np.ndarray, layer: Layer, law: Eigenstrain | None = None) -> np.ndarray:
+        """Part of each edge of the path that `layer` covers, or that a law of it drives, 0 … 1, shape (n_edge,)."""
+        first, last = self.span_of(layer, law)
+        return np.clip(np.minimum(edges + 1.0, last) - np.maximum(edges, first), 0.0, 1.0)
+
     def driven_edges(self, layer: Layer, law: Eigenstrain) -> range:
-        """Edges of the path that a law of `layer` drives: those of the layer whose middle lies in its interval, the end
-        excluded, so that adjoining intervals share none.
-        """
-        first, last = self.covered_stations(layer)
-        if law.interval is None:
-            return range(first, last)
-        begin, end = (math.ceil(length / self.edge_length - 0.5) for length in law.interval)
-        return range(max(first, begin), min(last, end))
+        """Edges of the path that a law of `layer` drives, all or in part."""
+        first, last = self.span_of(layer, law)
+        return range(math.floor(first), math.ceil(last)) if first < last else range(0)
 
     @model_validator(mode="after")
     def _check(self) -> Rod:
         refuse_all("Rod", faults_of_rod(self))
         return self
+
+
+def _near_whole(station: float) -> float:
+    """Return a station, or the whole number from which rounding keeps it."""
+    return float(round(station)) if abs(station - round(station)) <= ROUNDING * max(1.0, abs(station)) else station
 
 
 @dataclass(frozen=True)
@@ -247,7 +261,7 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
             if law.interval is not None and not is_ordered(law.interval):
                 faults.append((where, law.interval, ordered))
             elif not rod.driven_edges(layer, law):
-                demand = f"must hold the middle of an edge of the layer; an edge is {rod.edge_length:g} m long"
+                demand = "must hold a part of the layer"
                 faults.append((where, law.interval, demand))
         if layer.interval is None:
             continue

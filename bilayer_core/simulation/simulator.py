@@ -123,7 +123,8 @@ class Simulator:
         self._stepper = self._stepper_of(self.model)
         self.keeps_budget = budget
         self._stepper.ledger = EnergyLedger(self.model) if budget else None
-        self._state, self.settled = self._initial_state(), None
+        self._state = self._initial_state()
+        self.settled: StaticReport | None = None
         self.plane_watch = PlaneWatch(self._in_dimension, scene.duration) if self.plan.dimension == 2 else None
         self._controls = Controls(self._stepper, self._state)
         self._unsettled = scene.start == SETTLE

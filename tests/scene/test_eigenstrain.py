@@ -121,7 +121,7 @@ def test_strains_of_scenes_are_those_of_kernels():
         np.testing.assert_array_max_ulp(law.strain_at(values), free_strain(values, 0.3, 0.2, law.limit), 2)
 
 
-def test_adjoining_intervals_share_no_edge_and_leave_none_out():
+def test_adjoining_intervals_cover_each_edge_of_the_layer_once():
     strip = load_scene(
         driven(
             [
@@ -131,10 +131,13 @@ def test_adjoining_intervals_share_no_edge_and_leave_none_out():
             interval=[0.005, 0.09],
         )
     ).rods[0]
-    edges = [list(strip.driven_edges(strip.layers[1], law)) for law in strip.layers[1].eigenstrain]
-    # The middle of edge 2 lies at 12.5 mm: rounding may give it to either interval, but to one of them.
-    assert edges[0][0] == 1
-    assert sum(edges, []) == list(range(1, 18))
+    edges, grown = np.arange(strip.stations - 1), strip.layers[1]
+    parts = [strip.covered_parts(edges, grown, law) for law in grown.eigenstrain]
+    assert sum(parts) == pytest.approx(strip.covered_parts(edges, grown))
+    assert [part.sum() for part in parts] == pytest.approx(np.array([7.5, 48.5, 29.0]) / (1e3 * strip.edge_length))
+    assert [list(np.flatnonzero(part)) for part in parts] == [
+        list(strip.driven_edges(grown, law)) for law in grown.eigenstrain
+    ]
 
 
 @pytest.mark.parametrize(
@@ -169,8 +172,8 @@ def test_adjoining_intervals_share_no_edge_and_leave_none_out():
             ".interval: found [0.05, 0.2]; must be two increasing lengths [m] along the path, from 0 to 0.1",
         ),
         (
-            {"stimulus": "humidity", "gain": 1, "interval": [0.0501, 0.052]},
-            ".interval: found [0.0501, 0.052]; must hold the middle of an edge of the layer; an edge is 0.005 m long",
+            {"stimulus": "humidity", "gain": 1, "interval": [0.05, 0.05]},
+            ".interval: found [0.05, 0.05]; must be two increasing lengths [m] along the path, from 0 to 0.1",
         ),
         (
             [{"stimulus": "heat", "gain": 1}, {"stimulus": "humid", "gain": 1}],
@@ -210,3 +213,10 @@ def test_the_largest_eigenstrain_of_a_layer_counts_laws_where_they_meet(laws, pe
     assert any(
         f"eigenstrain up to {percent} %" in str(figure) for figure in validity_warnings(load_scene(driven(laws)))
     )
+
+
+def test_a_law_that_misses_its_layer_is_refused_however_near_it_is():
+    for interval in ([0.0491, 0.0493], [0.06, 0.07]):
+        content = driven({"stimulus": "heat", "gain": 0.1, "interval": interval}, interval=[0.005, 0.049])
+        with pytest.raises(SceneError, match="interval: found .* must hold a part of the layer"):
+            load_scene(content)

@@ -73,7 +73,7 @@ def set_stimuli(beam: PlanarBeam, scene: SceneConfig, values: dict[str, float]) 
         for law in layer.eigenstrain:
             limit = np.array([np.inf if law.saturation is None else law.saturation])
             eigenstrain = free_strain(np.array([values[law.stimulus]]), np.array([law.gain]), law.reference, limit)
-            strain[list(rod.driven_edges(layer, law))] += eigenstrain[0]
+            strain += rod.covered_parts(np.arange(len(strain)), layer, law) * eigenstrain[0]
         stiffness = sections(rod, layer, scene.materials[layer.material], np.zeros(1)).axial_stiffness[0]
         beam.force += stiffness * strain
         beam.moment += stiffness * side * layer.thickness * strain

@@ -16,6 +16,8 @@ from bilayer_core.verification.validate.validation_case import Case
 PAIRS = ((1.0, 1.0), (3.3, 6.7), (0.2, 3.0))
 """(m, n): the second is the one that is off most where nothing bends the last half edge."""
 STRAIN, LENGTH, PATCH, STATIONS = 0.02, 0.1, (0.04, 0.05), 81
+SMALL, LONG_PATCH = 0.005, (0.026, 0.074)
+"""Eigenstrain and place [m] of a patch that ends between stations of most meshes."""
 
 
 def beside_free_end(m: float, n: float, dimension: int) -> tuple[float, float]:
@@ -54,6 +56,19 @@ def beam(m: float, n: float) -> tuple[float, float]:
     return angle, arc + (LENGTH - PATCH[1]) * np.sin(angle)
 
 
+@cache
+def turned(model: str, stations: int) -> tuple[float, float]:
+    """Angle [rad] by which a patch turns its strip that begins and ends between stations, and that of an arc."""
+    config = bending.strip(1.0, 1.0, SMALL, stations)
+    config["rods"][0]["path"]["length"] = LENGTH
+    config["rods"][0]["layers"][1]["interval"] = list(LONG_PATCH)
+    simulator = Simulator(load_scene(config), dimension=2, model=model)
+    simulator.solve_static()
+    edges = np.diff(simulator.positions[:stations], axis=0)[[0, -1]]
+    first, last = np.arctan2(-edges[:, 2], edges[:, 0])
+    return float(last - first), timoshenko(1.0, 1.0) * SMALL / bending.THICKNESS * (LONG_PATCH[1] - LONG_PATCH[0])
+
+
 def last_turn(torsion: str, natural: tuple[float, float]) -> tuple[float, float]:
     """Pitch [m] of a bonded helix through its last four points, and that of least energy."""
     points = helix.middle_curve(torsion, *natural)
@@ -82,6 +97,17 @@ CASES = [
         for m, n in PAIRS
         for i, figure in enumerate(("angle", "tip"))
         for dimension in (2, 3)
+    ),
+    *(
+        Case(
+            f"ends/patch between stations/{model}, {stations} stations",
+            "Timoshenko's curvature times the length of the patch",
+            1e-3,
+            lambda model=model, stations=stations: turned(model, stations),
+            "rad",
+        )
+        for model in ("laminate", "two_rod")
+        for stations in (11, 21, 34, 81)
     ),
     *(
         Case(
