@@ -11,6 +11,7 @@ from bilayer_core.model.findings import few, told
 from bilayer_core.model.force_list import planned
 from bilayer_core.model.free_motions import mechanisms_of
 from bilayer_core.model.imperfect_shapes import advice
+from bilayer_core.model.implausible_numbers import implausible_numbers
 from bilayer_core.model.laminate import uneven_faces
 from bilayer_core.model.planarity import find_plane, require_plane
 from bilayer_core.model.redundancy import redundant_joints, require_possible_motion
@@ -104,6 +105,7 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
         _contact_pairs(scene, chosen_dimension),
         told(
             [
+                *implausible_numbers(scene),
                 *validity_warnings(scene),
                 *passing_warnings(scene),
                 *_warnings_of(scene, chosen_model, chosen_dimension),

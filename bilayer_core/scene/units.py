@@ -72,6 +72,8 @@ def parse_quantity(text: str, unit: str) -> float:
         raise ValueError("not a number with a unit")
     if match["unit"] is None:
         return float(match["number"])
+    if match["unit"].count("%") > 1:  # which the units library multiplies
+        raise ValueError(f"whose unit {match['unit']!r} has more than one %")
     factor = USUAL_UNITS.get(unit, {}).get(match["unit"])
     try:
         number = Decimal(match["number"])

@@ -1,0 +1,88 @@
+"""What a wide strip does that a beam does not: it is a plate, whose section may bend.
+
+In a strip of width w, thickness H and Poisson's ratio ν, curved by κ, the section bends to u(y): D u⁗ + E H κ² u = 0 with
+free borders. For uniform material the energy per length has the closed form (τ = 0; κ̄ of a plate that swells alike in
+all directions, D = E H³/12(1 − ν²))
+
+    U/w = ½ D [(κ − κ̄)² + κ̄² − 2ν (κ − κ̄) κ̄ − c² g(ψ)],    c = κ̄ − ν (κ − κ̄)
+    g = 2 (cosh ψ − cos ψ)/[ψ (sinh ψ + sin ψ)],    ψ = w (3(1 − ν²))^¼ √(|κ|/H)
+
+which was checked against the section solved numerically and against elasticity in space. g → 1, a narrow strip, is the
+beam of the models here: stiffness E w H³/12, and at rest κ = κ̄. g → 0 is a plate: D w, and κ = (1 + ν) κ̄. In between
+both depend on w²κ̄/H alone. A strip that is curved at rest without swelling has U/w = ½ D (1 − ν² g) (κ − κ̄)², and so at
+rest the stiffness EI (1 − ν² g)/(1 − ν²).
+
+A swollen strip that is wide enough has stretches of negative ∂²U/∂κ²: held straighter, it folds in one joint, as a tape
+spring does. The figures hold one width away from clamps.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+Array = np.ndarray
+SMALL = 0.05
+"""ψ below which g is its series: 1 − ψ⁴/180."""
+LARGE = 30.0
+"""ψ above which g is 2/ψ to the last digit."""
+RATIOS = np.geomspace(0.05, 1e4, 400)
+"""w²κ̄/H between which curvatures are interpolated."""
+CURVATURES = np.linspace(0.01, 1.6, 1600)
+"""Of κ/κ̄, where tangents are looked at."""
+
+
+def _factor(ratio: Array, poisson: float) -> Array:
+    """Return g of strips by their w²κ/H."""
+    psi = (3.0 * (1.0 - poisson**2)) ** 0.25 * np.sqrt(np.asarray(ratio, float))
+    middle = np.clip(psi, SMALL, LARGE)
+    g = 2.0 * (np.cosh(middle) - np.cos(middle)) / (middle * (np.sinh(middle) + np.sin(middle)))
+    return np.where(psi < SMALL, 1.0 - psi**4 / 180.0, np.where(psi > LARGE, 2.0 / np.maximum(psi, LARGE), g))
+
+
+def swollen_energy(curvature: Array, ratio: float, poisson: float) -> Array:
+    """Return U/(½ w D κ̄²) of a strip that swells alike in all directions.
+
+    Parameters
+    ----------
+    curvature : ndarray
+        κ/κ̄, above 0.
+    ratio : float
+        w²κ̄/H.
+    poisson : float
+        ν.
+    """
+    g = _factor(ratio * curvature, poisson)
+    change = curvature - 1.0
+    return change**2 + 1.0 - 2.0 * poisson * change - (1.0 - poisson * change) ** 2 * g
+
+
+@lru_cache(maxsize=32)
+def _rests(poisson: float) -> Array:
+    """κ/κ̄ at rest for each of `RATIOS`."""
+    bounds = (0.5, 1.05 + poisson) if poisson > 0.0 else (0.5, 1.05)
+    return np.array(
+        [
+            minimize_scalar(lambda x, r=r: swollen_energy(x, r, poisson), bounds=bounds, options={"xatol": 1e-7}).x
+            for r in RATIOS
+        ]
+    )
+
+
+def swollen_curvature(ratio: Array, poisson: float) -> Array:
+    """Return κ/κ̄ at rest of strips that swell alike in all directions, by their w²κ̄/H."""
+    return np.interp(np.log(np.maximum(ratio, RATIOS[0])), np.log(RATIOS), _rests(poisson))
+
+
+def curved_stiffness(ratio: Array, poisson: float) -> Array:
+    """Return the bending stiffness at rest, over EI, of strips that are curved without swelling, by their w²κ/H."""
+    return (1.0 - poisson**2 * _factor(ratio, poisson)) / (1.0 - poisson**2)
+
+
+@lru_cache(maxsize=256)
+def folds(ratio: float, poisson: float) -> bool:
+    """Return whether a swollen strip, held straighter than it rests, has a negative tangent somewhere."""
+    energy = swollen_energy(CURVATURES, ratio, poisson)
+    return bool((np.diff(energy, 2) < 0.0).any())
