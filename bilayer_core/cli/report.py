@@ -38,12 +38,14 @@ def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
     if summary["tolerance"] is not None and summary["steps"]:
         lengths = ", ".join(f"{name} {1e3 * length:.3g} ms" for name, length in summary["step_length"].items())
         yield f"  {'their length':22}{lengths}; {summary['inaccurate_steps']} attempts refused for their error"
-    yield f"  {'largest curvature':22}{summary['max_curvature']:.3g} 1/m in the run"
-    yield f"  {'largest strain':22}{100 * summary['max_strain']:.3g} % in the run, of an edge without its eigenstrain"
-    if summary["largest_energy"] > 0.0:
-        share = summary["numerical_energy"] / summary["largest_energy"]
+    bend = f"times thickness {summary['max_curvature_by_thickness']:.2g}"
+    yield f"  {'largest curvature':22}{summary['max_curvature']:.3g} 1/m in the run, {bend}"
+    fibre = f"{100 * summary['max_fibre_strain']:.3g} % of an outermost fibre"
+    yield f"  {'largest strain':22}{fibre}, {100 * summary['max_strain']:.3g} % of an edge, without eigenstrain"
+    if summary["energy_through"] > 0.0:
+        share = summary["numerical_energy"] / summary["energy_through"]
         again = f"; {summary['gaining_steps']} attempts refused that made some" if summary["gaining_steps"] else ""
-        yield f"  {'numerical energy':22}{100 * share:+.2g} % of the largest in the run{again}"
+        yield f"  {'numerical energy':22}{100 * share:+.2g} % of what went through the run{again}"
     if summary["min_gap"] is not None:
         yield f"  {'smallest gap':22}{1e3 * summary['min_gap']:.4g} mm in the run"
         yield f"  {'largest contact force':22}{1e3 * summary['max_contact_force']:.3g} mN on a node in the run"

@@ -13,7 +13,7 @@ from bilayer_core.engine.error_norm import ErrorNorm
 from bilayer_core.engine.integrate import Clock, Integration, StepControl, clear, empty_counts, integrate
 from bilayer_core.engine.observables import Observables, observe
 from bilayer_core.engine.potential import add_forces, expand_to_unknowns
-from bilayer_core.engine.run_extrema import count_shape
+from bilayer_core.engine.run_extrema import HEIGHT, LEAST_GAP, count_shape
 from bilayer_core.engine.step import treat_state, write_rest_strains
 from bilayer_core.engine.step_outcome import FAILURES, IntegrationReport
 from bilayer_core.engine.storage import Storage, new_configuration, new_work
@@ -21,6 +21,7 @@ from bilayer_core.errors import SimulationError
 from bilayer_core.forces.joints import Joints
 from bilayer_core.integrators.method import Method
 from bilayer_core.integrators.sdirk2 import METHOD as SELF_STARTING
+from bilayer_core.model.bend_faces import bend_faces
 from bilayer_core.model.contact_points import contact_point_names
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.contacts import RodContact, Surfaces
@@ -90,8 +91,11 @@ class Engine:
         self._integration: Integration | None = None
         self._no_joints = Joints.absent()
         self._evaluated = True  # whether forces are those of `end`
+        faces, thickness = bend_faces(model)
         self.extrema = RunExtrema.zeros(
             sizes,
+            faces=faces,
+            thickness=thickness,
             mass=float(model.rods.node_mass.sum()),
             voronoi_length=model.voronoi_length,
         )
@@ -106,7 +110,8 @@ class Engine:
     def start_over(self, height: float) -> None:
         """Forget the extrema of the run; the mass centre is at `height` [m]."""
         extrema = self.extrema
-        extrema.figures[:] = height, math.inf, 0.0, 0.0, 0.0
+        extrema.figures[:] = 0.0
+        extrema.figures[HEIGHT], extrema.figures[LEAST_GAP] = height, math.inf
         extrema.body_top[:] = -math.inf
         extrema.nodes[:], extrema.most_nodes[:], extrema.first_contact[:] = 0, 0, math.nan
 

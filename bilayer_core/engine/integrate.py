@@ -328,7 +328,7 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
         clock.time[0] = time
         whole = not fixed or time == grid
         clock.step[0] += whole
-        count_end(p, state, configuration_at(work.configurations[end]), work.stage, gap, time, run.extrema)
+        count_end(p, state, configuration_at(work.configurations[end]), work, gap, time, run.extrema)
         last = time == until or fixed and whole and time > until - 0.5 * control.dt
         if last or time >= due:
             return _leave(run, k + 1, CONVERGED, -1, end, gap)

@@ -1,37 +1,69 @@
-"""Extrema over a run: heights, gaps, contact forces, curvature, strain, and what touches what."""
+"""Extrema over a run: heights, gaps, contact forces, curvature, strain, and what touches what.
+
+The strain of the outermost fibre is that beyond the shape that layers take without load: with ε and χ of a curve, ε̄ and
+χ̄ at rest, and y the height of a face over it, (ε − ε̄) − y (χ − χ̄). Curvature × thickness takes the whole section.
+"""
 
 from __future__ import annotations
 
 import math
 
+from bilayer_core.engine.powers import LOST, SUPPLIED
 from bilayer_core.forces.bend_twist import bending_strain
 from bilayer_core.forces.rod_arms import node_of
 from bilayer_core.jit import kernel, piece
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
-from bilayer_core.model.records.step import Configuration, RunExtrema, Stage, StateArrays
+from bilayer_core.model.records.step import Configuration, RunExtrema, Stage, StateArrays, Work
+
+HEIGHT, LEAST_GAP, CONTACT_FORCE, CURVATURE, STRAIN, FIBRE_STRAIN, CURVATURE_BY_THICKNESS, PUT_IN, TAKEN_OUT = range(9)
+"""Slots of `RunExtrema.figures`."""
+
+
+@kernel
+def _strain(strands, stage, at, e):
+    """Return ε − ε̄ of an edge."""
+    return at.length[e] / strands.rest_length[e] - 1.0 - stage.rest_edge[e]
+
+
+@kernel
+def _strain_about(strands, stage, at, j):
+    """Return the mean of ε − ε̄ of the edges of a joint; a clamp edge has none."""
+    a, b = strands.joint_a[j], strands.joint_b[j]
+    if a >= strands.edge_count:
+        return _strain(strands, stage, at, b)
+    if b >= strands.edge_count:
+        return _strain(strands, stage, at, a)
+    return 0.5 * (_strain(strands, stage, at, a) + _strain(strands, stage, at, b))
 
 
 @piece(int, Problem, StateArrays, Configuration, Stage, RunExtrema)
 def count_shape(p, state, at, stage, extrema):
     """Take the shape of a state, which is `at`, into the extrema: curvature, strain, and heights of bodies."""
-    strands, rest_edge, figures, voronoi = p.strands, stage.rest_edge, extrema.figures, extrema.voronoi_length
-    sharpest = 0.0
+    strands, figures, voronoi = p.strands, extrema.figures, extrema.voronoi_length
     for j in range(voronoi.shape[0]):
         bend = bending_strain(at, strands.joint_a[j], strands.joint_b[j])
-        sharpest = max(sharpest, abs(bend) / voronoi[j])
-    largest = 0.0
+        curvature = abs(bend) / voronoi[j]
+        figures[CURVATURE] = max(figures[CURVATURE], curvature)
+        figures[CURVATURE_BY_THICKNESS] = max(figures[CURVATURE_BY_THICKNESS], curvature * extrema.thickness[j])
+        rest = p.off_axis.rest[j, 0] if p.off_axis.exists else stage.rest_joint[j, 0]
+        stretch = _strain_about(p.strands, stage, at, j)
+        for f in range(2):
+            strain = abs(stretch - extrema.faces[j, f] * (bend - rest) / voronoi[j])
+            figures[FIBRE_STRAIN] = max(figures[FIBRE_STRAIN], strain)
     for e in range(strands.edge_count):
-        largest = max(largest, abs(at.length[e] / strands.rest_length[e] - 1.0 - rest_edge[e]))
-    figures[3], figures[4] = max(figures[3], sharpest), max(figures[4], largest)
+        strain = abs(_strain(strands, stage, at, e))
+        figures[STRAIN], figures[FIBRE_STRAIN] = max(figures[STRAIN], strain), max(figures[FIBRE_STRAIN], strain)
     for b in range(extrema.body_top.shape[0]):
         extrema.body_top[b] = max(extrema.body_top[b], state.body_position[b, 2])
     return READY
 
 
-@piece(int, Problem, StateArrays, Configuration, Stage, float, float, RunExtrema)
-def count_end(p, state, at, stage, gap, time, extrema):
-    """Take the end of a step into the extrema: the smallest gap there [m] and the time [s] are given."""
+@piece(int, Problem, StateArrays, Configuration, Work, float, float, RunExtrema)
+def count_end(p, state, at, work, gap, time, extrema):
+    """Take the end of a step into the extrema: the smallest gap there [m] and the time [s] are given. What the step
+    supplied and lost is added to the energy that went through.
+    """
     strands, figures, nodes = p.strands, extrema.figures, p.strands.node_mass.shape[0]
     height = largest = 0.0
     for i in range(nodes):
@@ -42,10 +74,12 @@ def count_end(p, state, at, stage, gap, time, extrema):
     for r in range(raised.edge.shape[0]):
         moment = raised.first_moment[r, 0] + raised.first_moment[r, 1]
         height += moment * state.director1[raised.edge[r], 2]
-    figures[0], figures[1] = max(figures[0], height / extrema.mass), min(figures[1], gap)
-    figures[2] = max(figures[2], math.sqrt(largest))
+    figures[HEIGHT], figures[LEAST_GAP] = max(figures[HEIGHT], height / extrema.mass), min(figures[LEAST_GAP], gap)
+    figures[CONTACT_FORCE] = max(figures[CONTACT_FORCE], math.sqrt(largest))
+    figures[PUT_IN] += abs(work.account[SUPPLIED])
+    figures[TAKEN_OUT] += abs(work.account[LOST])
     _count_contacts(p.surfaces, time, extrema)
-    return count_shape(p, state, at, stage, extrema)
+    return count_shape(p, state, at, work.stage, extrema)
 
 
 @kernel

@@ -1,8 +1,8 @@
 """What a wide strip does that a beam does not: it is a plate, whose section may bend.
 
-In a strip of width w, thickness H and Poisson's ratio ν, curved by κ, the section bends to u(y): D u⁗ + E H κ² u = 0 with
-free borders. For uniform material the energy per length has the closed form (τ = 0; κ̄ of a plate that swells alike in
-all directions, D = E H³/12(1 − ν²))
+In a strip of width w, thickness H and Poisson's ratio ν, curved by κ, the section bends to u(y): D u⁗ + E H κ² u = 0,
+with free borders. For uniform material the energy per length has the closed form (τ = 0; κ̄ of a plate that swells
+alike in all directions, D = E H³/12(1 − ν²))
 
     U/w = ½ D [(κ − κ̄)² + κ̄² − 2ν (κ − κ̄) κ̄ − c² g(ψ)],    c = κ̄ − ν (κ − κ̄)
     g = 2 (cosh ψ − cos ψ)/[ψ (sinh ψ + sin ψ)],    ψ = w (3(1 − ν²))^¼ √(|κ|/H)

@@ -237,6 +237,8 @@ class Frame:
     rejected : tuple of int
         Attempts at steps that were made again, shorter, since the start of the run; those of them whose error was too
         large; those that made energy.
+    beyond_limits : tuple of str
+        For each limit of the model that the run has passed since its start, what it is and what that means.
     """
 
     time: float
@@ -264,6 +266,7 @@ class Frame:
     state: np.ndarray
     contacts: tuple[tuple[str, str], ...] = field(default_factory=tuple)  # which leaves no attribute of the class
     rejected: tuple[int, int, int] = (0, 0, 0)
+    beyond_limits: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         counts = f"{len(self.positions)} nodes, {len(self.body_positions)} bodies"

@@ -82,4 +82,5 @@ def make_frame(stepper: Stepper, state: State, time: float, statistics: RunStati
         substeps=statistics.substeps,
         cpu_time=cpu_time,
         rejected=(statistics.rejected, statistics.inaccurate, statistics.gaining),
+        beyond_limits=statistics.beyond_limits,
     )

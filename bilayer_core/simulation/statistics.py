@@ -11,7 +11,11 @@ from bilayer_core.engine.energy_account import NUMERICAL
 from bilayer_core.engine.step_outcome import IntegrationReport
 from bilayer_core.model.model import Model
 from bilayer_core.model.state import State
+from bilayer_core.model.validity import LARGE_STRAIN, THICK_CURVATURE
 from bilayer_core.simulation.stepper import Stepper
+
+FIBRE_STRAIN = f"a fibre is strained by more than {100 * LARGE_STRAIN:g} %: the law of the material is linear"
+CURVATURE_BY_THICKNESS = f"curvature × thickness is above {THICK_CURVATURE:g}: it is no thin rod"
 
 
 def center_of_mass(model: Model, state: State) -> np.ndarray:
@@ -35,9 +39,10 @@ class RunStatistics:
     """Counts, extrema and first contacts of a run, from `update` after every few steps.
 
     Times in s, lengths in m, forces in N, residuals in m/s, curvatures in 1/m. `max_strain` is the largest magnitude of
-    the strain of an edge without its eigenstrain, `body_tops` the greatest height of each body; these two and
-    `max_curvature` count the state at the start too. `numerical_before` is the numerical energy of the
-    state where the run began [J].
+    the strain of an edge without its eigenstrain, `max_fibre_strain` that of the fibre strained most, and
+    `max_curvature_by_thickness` the largest product of both (`engine.run_extrema`); `body_tops` is the greatest height
+    of each body. These and `max_curvature` count the state at the start too. `numerical_before` is the numerical energy
+    of the state where the run began, `put_in` and `taken_out` are sums of what each step was supplied and lost [J].
     """
 
     steps: int = 0
@@ -59,9 +64,22 @@ class RunStatistics:
     com_max_height: float = -math.inf
     max_curvature: float = 0.0
     max_strain: float = 0.0
+    max_fibre_strain: float = 0.0
+    max_curvature_by_thickness: float = 0.0
+    put_in: float = 0.0
+    taken_out: float = 0.0
     numerical_before: float = 0.0
     body_tops: dict[str, float] = field(default_factory=dict)
     bodies: dict[str, BodyContact] = field(default_factory=dict)
+
+    @property
+    def beyond_limits(self) -> tuple[str, ...]:
+        """For each limit of the model that the run has passed, what it is and what that means."""
+        told = (
+            (self.max_fibre_strain > LARGE_STRAIN, FIBRE_STRAIN),
+            (self.max_curvature_by_thickness > THICK_CURVATURE, CURVATURE_BY_THICKNESS),
+        )
+        return tuple(text for passed, text in told if passed)
 
     def take_shape(self, stepper: Stepper, state: State) -> None:
         """Take in the shape of a state to which no step has led.
@@ -106,7 +124,8 @@ class RunStatistics:
     def _take_extrema(self, stepper: Stepper) -> None:
         extrema, model = stepper.engine.extrema, stepper.model
         self.com_max_height, self.min_gap, self.max_contact_force, *shape = extrema.figures.tolist()
-        self.max_curvature, self.max_strain = shape
+        self.max_curvature, self.max_strain, self.max_fibre_strain, self.max_curvature_by_thickness, *flows = shape
+        self.put_in, self.taken_out = flows
         self.body_tops = dict(zip(model.bodies.names, extrema.body_top.tolist(), strict=True))
         if not model.has_surface_contact:
             return

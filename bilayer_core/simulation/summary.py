@@ -10,27 +10,30 @@ import numpy as np
 from bilayer_core.engine.energy_account import LARGEST, NUMERICAL
 from bilayer_core.model.impacts import heaviest, stiffness_that_holds
 from bilayer_core.model.model import Model
-from bilayer_core.model.validity import LARGE_STRAIN
+from bilayer_core.model.validity import LARGE_STRAIN, THICK_CURVATURE
 from bilayer_core.observed.system import versions
 from bilayer_core.simulation.plane_watch import PlaneWatch
 from bilayer_core.simulation.run_result import Termination
+from bilayer_core.simulation.statistics import RunStatistics
 from bilayer_core.simulation.views.body import BodyView
 from bilayer_core.simulation.views.joint import JointView
 
 LARGE_NUMERICAL = 0.1
-"""Part of the largest energy of a run that its steps may make or lose without a warning."""
+"""Part of the energy that went through a run that its steps may make or lose without a warning."""
 
 
 def summarise(simulator: Any) -> dict:
     """Figures of a run since its start; lengths in m, times in s, forces in N, energies in J, curvatures in 1/m.
 
     Of the run, over the start and the ends of all accepted steps: ``max_curvature`` (through the thickness),
-    ``max_strain`` (of an edge, without its eigenstrain), ``com_max_height``, ``min_gap``, ``max_contact_force``, and of
+    ``max_strain`` (of an edge, without its eigenstrain), ``max_fibre_strain`` (of the outermost fibres beyond the shape
+    at rest), ``max_curvature_by_thickness``, ``com_max_height``, ``min_gap``, ``max_contact_force``, and of
     bodies ``lift``, the greatest height over that at the start, ``first_contact`` and ``most_contact_nodes``. Of the
     end: ``com_end``, ``mean_curvature``, ``tip_positions``, ``energy``, and of bodies ``end``, ``lift_end`` and
     ``contact_nodes``. ``largest_energy`` is that of motion, elasticity and contact together, with the potential of
-    gravity from its value at the start, and ``numerical_energy`` what steps have made or, below zero, lost of it beyond
-    all forces (`engine.energy_account`). ``warnings`` tell where the run left the range in which the model is meant to
+    gravity from its value at the start, ``energy_through`` the energy that went through: that or, if it is more, what
+    was supplied or lost in all steps. ``numerical_energy`` is what steps have made or, below zero, lost beyond all
+    forces (`engine.energy_account`). ``warnings`` tell where the run left the range in which the model is meant to
     be used, or where the robot would have left the plane of a model of dimension 2.
     """
     model, statistics, plan = simulator.model, simulator.statistics, simulator.plan
@@ -39,7 +42,8 @@ def summarise(simulator: Any) -> dict:
     simulated = simulator.time - simulator.start_time
     cpu = simulator.cpu_time
     min_gap = statistics.min_gap
-    numerical, largest = numerical_energy(simulator)
+    numerical, through = numerical_energy(simulator)
+    largest = float(simulator.energy_account[LARGEST])
     return {
         "scene": simulator.scene.name,
         "model": plan.model,
@@ -83,11 +87,14 @@ def summarise(simulator: Any) -> dict:
         "mean_curvature": float(np.average(curvature, weights=model.node_length)),
         "tip_positions": {s.name: positions[s.last_node].tolist() for s in model.strands},
         "max_strain": statistics.max_strain,
+        "max_fibre_strain": statistics.max_fibre_strain,
+        "max_curvature_by_thickness": statistics.max_curvature_by_thickness,
         "contact_stiffness": model.contact_stiffness or None,
         "min_gap": min_gap if np.isfinite(min_gap) else None,
         "max_contact_force": statistics.max_contact_force,
         "energy": simulator.energy(),
         "largest_energy": largest,
+        "energy_through": through,
         "numerical_energy": numerical,
         **({"budget": simulator.budget()} if simulator.keeps_budget else {}),
         "bodies": _bodies(simulator),
@@ -96,7 +103,7 @@ def summarise(simulator: Any) -> dict:
         },
         "warnings": [
             *simulator.start_warnings,
-            *_warnings(statistics.max_strain, numerical, largest, simulator.plane_watch),
+            *_warnings(statistics, numerical, through, simulator.plane_watch),
             *_of_contact(model, statistics.unresolved, largest),
         ],
         "versions": versions(),
@@ -104,20 +111,28 @@ def summarise(simulator: Any) -> dict:
 
 
 def numerical_energy(simulator: Any) -> tuple[float, float]:
-    """Return the energy that steps made (below zero: lost) beyond all forces, and the run's largest energy [J]."""
-    account = simulator.energy_account
-    return float(account[NUMERICAL]) - simulator.statistics.numerical_before, float(account[LARGEST])
+    """Return the energy that steps made (below zero: lost) beyond all forces, and what went through the run [J]: its
+    largest energy, or what was supplied or lost if that is more.
+    """
+    account, statistics = simulator.energy_account, simulator.statistics
+    through = max(float(account[LARGEST]), statistics.put_in, statistics.taken_out)
+    return float(account[NUMERICAL]) - statistics.numerical_before, through
 
 
-def _warnings(strain: float, numerical: float, largest: float, plane_watch: PlaneWatch | None) -> Iterator[str]:
-    if strain > LARGE_STRAIN:
+def _warnings(
+    statistics: RunStatistics, numerical: float, through: float, plane_watch: PlaneWatch | None
+) -> Iterator[str]:
+    fibre, bend = statistics.max_fibre_strain, statistics.max_curvature_by_thickness
+    if fibre > LARGE_STRAIN:
         yield (
-            f"largest strain of an edge {100 * strain:.3g} % (at most {100 * LARGE_STRAIN:g} %): "
-            "the law of the material is linear"
+            f"largest strain of a fibre {100 * fibre:.3g} % (at most {100 * LARGE_STRAIN:g} %), of an edge "
+            f"{100 * statistics.max_strain:.3g} %: the law of the material is linear"
         )
-    if abs(numerical) > LARGE_NUMERICAL * largest:
+    if bend > THICK_CURVATURE:
+        yield f"largest curvature × thickness {bend:.3g} (at most {THICK_CURVATURE:g}): it is no thin rod"
+    if abs(numerical) > LARGE_NUMERICAL * through:
         yield (
-            f"numerical energy {100 * numerical / largest:+.3g} % of the largest of the run (at most "
+            f"numerical energy {100 * numerical / through:+.3g} % of the energy that went through (at most "
             f"{100 * LARGE_NUMERICAL:g} %): what vibrates or meets is too fast for the steps; a smaller tolerance or "
             "dt resolves it, `retardation_time` of a material damps it"
         )

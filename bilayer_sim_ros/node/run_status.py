@@ -43,7 +43,7 @@ class Status:
         Such attempts since the start.
     residual : float
         Largest of the last velocity corrections of steps [m/s].
-    numerical_energy, largest_energy : float
+    numerical_energy, energy_through : float
         What steps have made or, below zero, lost of energy since the start, and the largest energy of the run [J].
     waited : float
         Real time for which there has been no step because no controller answers [s].
@@ -66,7 +66,7 @@ class Status:
     residual: float = 0.0
     rejected_in_all: int = 0
     numerical_energy: float = 0.0
-    largest_energy: float = 0.0
+    energy_through: float = 0.0
     waited: float = 0.0
     log: LogStatus = LogStatus()
     dropped: int = 0
@@ -126,7 +126,7 @@ class StatusReporter:
         if real < STATUS_PERIOD:
             return
         status, simulated = self._status, simulator.time
-        status.numerical_energy, status.largest_energy = numerical_energy(simulator)
+        status.numerical_energy, status.energy_through = numerical_energy(simulator)
         status.rejected_in_all = simulator.statistics.rejected
         status.real_time_factor = (simulated - status.time) / real
         status.time, status.paused, status.real = simulated, paused, real

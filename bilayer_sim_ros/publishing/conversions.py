@@ -70,7 +70,7 @@ def to_diagnostics(status: Status, name: str, ignored: Mapping[str, int]) -> Dia
     elif status.dropped:
         message += f", and {status.dropped} frames were left out of the log: the disk is too slow"
     per_step = status.iterations / status.steps if status.steps else math.nan
-    part = status.numerical_energy / status.largest_energy if status.largest_energy > 0.0 else 0.0
+    part = status.numerical_energy / status.energy_through if status.energy_through > 0.0 else 0.0
     values = {
         "simulated time [s]": f"{status.time:.6g}",
         "real-time factor": f"{status.real_time_factor:.4g}",
@@ -81,7 +81,7 @@ def to_diagnostics(status: Status, name: str, ignored: Mapping[str, int]) -> Dia
         "Newton iterations per step": f"{per_step:.3g}",
         "largest residual [m/s]": f"{status.residual:.3g}",
         "numerical energy [J]": f"{status.numerical_energy:.3g}",
-        "numerical energy, of the largest": f"{part:.3g}",
+        "numerical energy, of what went through": f"{part:.3g}",
         "waited for a stimulus [s]": f"{status.waited:.3g}",
         **{f"answers ignored that were {why}": str(count) for why, count in ignored.items()},
         "frames left out of the log": str(status.log.dropped),

@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
-from support.sample_scenes import ball, fixed, layer, rod, scene
+from support.sample_scenes import GEL, ball, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.engine.evaluator import Evaluator
+from bilayer_core.log.messages.events import WARN, EventDetector
+from bilayer_core.log.run.memory import MemoryRecorder
 
 PULSE = {"type": "table", "times": [0, 0.02, 0.04], "values": [0, 1, 0]}
 ROUNDING = 1e-12
@@ -107,8 +109,68 @@ def test_a_run_of_large_strain_has_a_warning_and_one_of_small_strain_has_none():
         simulator.solve_static()
         found = simulator.summary()
         assert found["max_strain"] == pytest.approx(strain, rel=1e-6)
-        told = [f"largest strain of an edge {100 * strain:.3g} % (at most 10 %): the law of the material is linear"]
+        assert found["max_fibre_strain"] == pytest.approx(strain, rel=1e-6)
+        each = f"{100 * strain:.3g} %"
+        told = [
+            f"largest strain of a fibre {each} (at most 10 %), of an edge {each}: the law of the material is linear"
+        ]
         assert found["warnings"] == (told if warned else [])
+
+
+def bent(turn, thickness=2e-3, **more):
+    """A strip of one layer whose natural curvature turns it by `turn` [rad] from a straight path."""
+    strip = rod([layer(thickness=thickness)], length=0.05, stations=26, clamp_start="wall", clamp_end="hand", **more)
+    hand = {"name": "hand", "position": [0.05, 0, 0], "motion": {"type": "free", "mass": 1e-4, "inertia": [1e-8] * 3}}
+    moment = GEL["youngs_modulus"] * strip["width"] * thickness**3 / 12.0 * turn / 0.05
+    load = {"name": "twirl", "body": "hand", "moment": [0, moment, 0]}
+    return scene([strip], bodies=[fixed("wall"), hand], loads=[load])
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_the_outermost_fibre_of_a_strip_in_pure_bending_strains_by_half_its_thickness_times_the_curvature(dimension):
+    """κ = M/EI everywhere: 40 1/m, on 2 mm."""
+    simulator = Simulator(load_scene(bent(2.0)), dimension=dimension)
+    simulator.solve_static()
+    found = simulator.summary()
+    assert found["max_curvature"] == pytest.approx(40.0, rel=2e-3)  # of 25 edges
+    assert found["max_curvature_by_thickness"] == pytest.approx(2e-3 * found["max_curvature"], rel=1e-9)
+    assert found["max_fibre_strain"] == pytest.approx(1e-3 * found["max_curvature"], rel=1e-6)
+    assert found["max_strain"] < 1e-7
+    assert not found["warnings"]
+
+
+def test_bending_beyond_the_limits_of_a_thin_rod_is_warned_of_and_an_event_once():
+    simulator = Simulator(load_scene(bent(6.0)))
+    simulator.solve_static()
+    recorder = MemoryRecorder()
+    simulator.run(0.01, observers=[recorder])
+    found, detector = simulator.summary(), EventDetector(recorder.description)
+    fibre, bend = found["warnings"]
+    assert fibre.startswith("largest strain of a fibre 12 % (at most 10 %), of an edge ")
+    assert bend == "largest curvature × thickness 0.239 (at most 0.2): it is no thin rod"
+    events = [event for frame in recorder.frames for event in detector.see(frame) if event.name == "validity"]
+    assert [event.text for event in events] == [
+        "a fibre is strained by more than 10 %: the law of the material is linear",
+        "curvature × thickness is above 0.2: it is no thin rod",
+    ]
+    assert {event.level for event in events} == {WARN}
+
+
+@pytest.mark.parametrize("model", ["laminate", "two_rod"])
+def test_free_bending_by_swelling_multiplies_curvature_with_the_thickness_of_both_layers(model):
+    layers = [layer("lower"), layer("upper", eigenstrain={"stimulus": "heat", "gain": 0.02})]
+    free = scene(
+        [rod(layers, stations=41, clamp_start="wall")],
+        stimuli={"heat": {"schedule": {"type": "hold", "value": 1.0}}},
+        bodies=[fixed("wall")],
+    )
+    simulator = Simulator(load_scene(free), model=model)
+    simulator.solve_static()
+    simulator.load_state(simulator.save_state())  # which begins with the shape at rest
+    found = simulator.summary()
+    assert found["max_curvature_by_thickness"] == pytest.approx(1.5 * 0.02, rel=0.02)  # Timoshenko
+    if model == "laminate":  # beyond the shape at rest; a layer by itself has the stress of the other
+        assert found["max_fibre_strain"] < 1e-6
 
 
 def test_a_step_that_was_never_made_is_in_no_figure():

@@ -41,13 +41,13 @@ def test_diagnostics_warn_when_the_simulation_is_too_slow_or_its_log_lacks_somet
 def test_diagnostics_give_means_over_the_steps_since_the_last_ones():
     status = Status(1.5, False, real_time_factor=1.0, steps=4, substeps=5, iterations=10, residual=2e-7)
     status.rejected, status.rejected_in_all, status.log = 7, 12, LogStatus(waiting=5)
-    status.numerical_energy, status.largest_energy = -0.02, 0.4
+    status.numerical_energy, status.energy_through = -0.02, 0.4
     array = to_diagnostics(status, "/bilayer_sim", {"late": 3})
     values = {value.key: value.value for value in array.status[0].values}
     assert values["Newton iterations per step"] == "2.5"
     assert values["answers ignored that were late"] == "3"
     assert (values["rejected steps"], values["rejected steps since the start"]) == ("7", "12")
-    assert (values["numerical energy [J]"], values["numerical energy, of the largest"]) == ("-0.02", "-0.05")
+    assert (values["numerical energy [J]"], values["numerical energy, of what went through"]) == ("-0.02", "-0.05")
     assert (values["in the queue of the log"], values["frames left out of the log"]) == ("5", "0")
     assert values["largest residual [m/s]"] == "2e-07"
     assert to_seconds(array.header.stamp) == 1.5

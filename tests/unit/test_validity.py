@@ -158,7 +158,7 @@ def test_what_a_scene_lacks_is_not_judged_for_validity():
     assert len(told) == 1 and "length/width" in told[0]
 
 
-# Of a free strip of equal layers that swell alike, by w²κ/H: curvature over that of a narrow one, by finite elements in space
+# Of a free strip of equal layers that swell alike, by w²κ/H: curvature over that of a narrow one, by finite elements
 # and, for ν = 0.5, by a plate that was solved across its width.
 IN_SPACE = {0.3: {2.6: 0.936, 4.3: 0.886, 6.0: 0.862, 10.0: 0.966, 20.0: 1.129}}
 OF_A_PLATE = {0.5: {0.5: 0.998, 2.0: 0.971, 4.3: 0.918, 6.0: 0.919, 10.0: 1.156, 36.0: 1.38, 100.0: 1.432}}

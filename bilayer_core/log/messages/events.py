@@ -1,4 +1,4 @@
-"""Events of a run in words: contact made and lost, steps rejected, take-off and landing.
+"""Events of a run in words: contact made and lost, steps rejected, take-off and landing, limits of the model passed.
 
 Events are found by comparing a frame with the one before, so that a run is the same whether or not anybody looks, and
 costs nothing where nobody does. Their time is that of the frame: contact is made or lost at some time after the frame
@@ -16,6 +16,7 @@ DEBUG, INFO, WARN = 10, 20, 30
 """Levels of ``rcl_interfaces/msg/Log``."""
 LEVEL_NAMES = {DEBUG: "DEBUG", INFO: "INFO", WARN: "WARN"}
 CONTACT, STEPS, FLIGHT, STIMULUS, SETTING, END = "contact", "steps", "flight", "stimulus", "setting", "end"
+VALIDITY = "validity"
 """Names of events."""
 REJECTED_FRAMES = 50
 """Frames between two messages about rejected steps, which sum up those between; the first comes at once."""
@@ -32,7 +33,7 @@ class Event:
     level : int
         `DEBUG`, `INFO` or `WARN`.
     name : str
-        Its kind: ``contact``, ``steps``, ``flight``, ``stimulus``, ``setting`` or ``end``.
+        Its kind: ``contact``, ``steps``, ``flight``, ``validity``, ``stimulus``, ``setting`` or ``end``.
     text : str
     """
 
@@ -60,13 +61,14 @@ class EventDetector:
         self._stood = False
         self._rejected = (0, 0, 0)
         self._told, self._left = (0, 0, 0), 0
+        self._beyond: tuple[str, ...] = ()
 
     def see(self, frame: Frame) -> list[Event]:
         """Return the events since the frame before; at the first frame, the contacts that it has."""
         pairs = frozenset(frame.contacts)
         if self._pairs is None:
             self._pairs, self._stood = pairs, self._stands(pairs)
-            return _contacts(frame.time, pairs, "in contact") + self._rejections(frame)
+            return _contacts(frame.time, pairs, "in contact") + self._limits(frame) + self._rejections(frame)
         events = _contacts(frame.time, self._pairs - pairs, "contact lost")
         events += _contacts(frame.time, pairs - self._pairs, "contact made")
         self._pairs = pairs
@@ -75,7 +77,7 @@ class EventDetector:
             text = "landing: the robot touches something again" if stands else "take-off: the robot touches nothing"
             events.append(Event(frame.time, INFO, FLIGHT, text))
         self._stood = stands
-        return events + self._rejections(frame)
+        return events + self._limits(frame) + self._rejections(frame)
 
     def end(self, time: float) -> list[Event]:
         """Return the events that are still to be reported at the end of a run."""
@@ -84,6 +86,12 @@ class EventDetector:
     def _stands(self, pairs: Iterable[tuple[str, str]]) -> bool:
         """Return whether the robot touches anything else."""
         return any((a in self._robot) != (b in self._robot) for a, b in pairs)
+
+    def _limits(self, frame: Frame) -> list[Event]:
+        """Return a warning for each limit of the model that the run has passed since the frame before."""
+        new = [text for text in frame.beyond_limits if text not in self._beyond]
+        self._beyond = frame.beyond_limits
+        return [Event(frame.time, WARN, VALIDITY, text) for text in new]
 
     def _rejections(self, frame: Frame) -> list[Event]:
         if any(now < before for now, before in zip(frame.rejected, self._told, strict=True)):

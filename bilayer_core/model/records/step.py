@@ -55,6 +55,7 @@ class Stage:
         3,
         3,
     )  # likewise; R̄ is no rotation: (R − R̄)/(γ h) is dR/dt
+    still: Vector = (1,)  # 1 where rest is looked for and displacements are no motion, else 0
     origin_fluid_momentum: Matrix = ("wet", 3)  # P̄ of the fluid as in `Fluid.momentum` [N s]; none without added mass
     predicted_director: Matrix = ("raised", 3)  # of raised edges, as a vector that inertia takes along
     predicted_position: Matrix = ("node", 3)  # x̃ of nodes [m]
@@ -139,7 +140,9 @@ class RunExtrema:
 
     mass: float  # of all rods [kg]
     voronoi_length: Vector  # of bending elements [m], shape (n_bend,)
-    figures: Vector = (5,)  # highest mass centre, smallest gap [m], largest contact force [N], curvature [1/m], strain
+    faces: Matrix  # heights of both faces over the curve at bending elements [m], shape (n_bend, 2)
+    thickness: Vector  # of the whole section there [m], shape (n_bend,)
+    figures: Vector = (9,)  # see `engine.run_extrema`
     body_top: Vector = ("body",)  # greatest height of each body's position [m]
     nodes: Indices = ("surface",)  # that touch each surface now
     last_surface: Indices = ("node",)  # scratch
