@@ -7,7 +7,7 @@ from typing import Any
 from bilayer_core.cli.terminal import say
 from bilayer_core.studies.converge.order import ROUNDING
 from bilayer_core.studies.converge.quantities import unit_of
-from bilayer_core.studies.converge.study import BASE, FINER_STEP, Row, Study
+from bilayer_core.studies.converge.study import BASE, FINER_STEP, FINEST_STEP, Row, Study
 
 NO_ORDER = "none seen"
 
@@ -20,10 +20,11 @@ def errors_of(study: Study) -> dict[str, Any]:
             "finer": row.values[FINER_STEP],
             "error": row.time.bar,
             "order": row.time.order,
+            **({"finest": row.values[FINEST_STEP]} if FINEST_STEP in row.values else {}),
         }
         for row in study.rows
     }
-    return {"figures": figures, "missing": study.missing}
+    return {"figures": figures, "missing": study.missing, "unseen": list(study.unseen)}
 
 
 def print_errors(study: Study) -> None:
@@ -32,16 +33,20 @@ def print_errors(study: Study) -> None:
     from rich.table import Table
 
     table = Table(box=None, padding=(0, 2, 0, 0))
-    for title in ("global error", "value", FINER_STEP, "error", "order"):
+    finest = any(FINEST_STEP in row.values for row in study.rows)
+    levels = (BASE, FINER_STEP, FINEST_STEP) if finest else (BASE, FINER_STEP)
+    for title in ("global error", "value", *levels[1:], "error", "order"):
         table.add_column(title, justify="left" if title == "global error" else "right")
     for row in study.rows:
         unit, factor = unit_of(row.name)
-        values = (f"{factor * row.values[run]:.6g} {unit}" for run in (BASE, FINER_STEP))
+        values = (f"{factor * row.values[run]:.6g} {unit}" for run in levels)
         table.add_row(row.name, *values, f"± {factor * row.time.bar:.2g} {unit}", _order(row))
     Console(width=120).print(table)
     for name, reason in study.missing.items():
         say(f"  {name}: {reason}")
     say("  Of the time steps alone; `bilayer converge` adds the mesh. Contact begins and ends within a step.")
+    for text in study.unseen:
+        say(f"  Not seen: {text}.")
     if any(_order(row) == NO_ORDER for row in study.rows):
         say(
             "  Where no order is seen, runs at twice, once and half the step do not close in on a limit: the error is\n"

@@ -30,6 +30,7 @@ TOLERANCE_HELP = (
     "`--error-estimate` tells it."
 )
 ERROR_HELP = "Show the global error of the headline numbers, from runs at twice and half the step."
+QUARTER_HELP = "With --error-estimate: a run at a quarter of the step as well, for what half the step does not resolve."
 OUTPUT_SUFFIXES = {"log": ".mcap", "rrd": ".rrd", "summary": ".json", "save_state": ".npz"}
 """How the names of outputs end, by their options."""
 
@@ -62,6 +63,7 @@ RATE_ROUNDING = 1e-9
 @click.option("--at", type=Duration(from_zero=True), metavar="T", help="Of the log of --from-state, its state at T.")
 @click.option("--budget", is_flag=True, help="Show where the energy went (steps cost four to thirteen times as much).")
 @click.option("--error-estimate", is_flag=True, help=ERROR_HELP)
+@click.option("--quarter-step", is_flag=True, help=QUARTER_HELP)
 @click.option("--force", is_flag=True, help="Replace existing files.")
 @click.option("--quiet", is_flag=True, help="Neither progress nor summary.")
 def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: bool, **options: Any) -> None:
@@ -82,7 +84,9 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
     duration = _duration(simulator, duration)
     if not quiet:
         _say_if_too_often(simulator, options["log_rate"])
-    judge = _Judge(simulator, duration, quiet) if options["error_estimate"] else None
+    if options["quarter_step"] and not options["error_estimate"]:
+        raise InputError("--quarter-step: adds a run to those of --error-estimate; give that too")
+    judge = _Judge(simulator, duration, quiet, options["quarter_step"]) if options["error_estimate"] else None
     failure = _simulate(simulator, duration, observers, interrupt, quiet, judge)
     if judge is not None and failure is None and not interrupt.granted:
         judge.estimate()
@@ -120,10 +124,10 @@ def _is_stdout(key: str, options: dict[str, Any]) -> bool:
 class _Judge:
     """The runs at twice and half the step, beside the one that was asked for, and what comes of them."""
 
-    def __init__(self, simulator: Simulator, duration: float, quiet: bool):
+    def __init__(self, simulator: Simulator, duration: float, quiet: bool, quarter: bool):
         from bilayer_core.studies.converge.quantities import Watch
 
-        self._scene, self._duration, self._quiet = simulator.scene, duration, quiet
+        self._scene, self._duration, self._quiet, self._quarter = simulator.scene, duration, quiet, quarter
         self._start, self._watch = simulator.save_state(), Watch(simulator)
         self.look = self._watch.look
         self.study: Study | None = None
@@ -147,6 +151,7 @@ class _Judge:
                 progress=tell,
                 own=self._watch.figures(),
                 start=self._start,
+                quarter=self._quarter,
             )
         except SimulationError as failure:
             self.failure = failure

@@ -15,7 +15,7 @@ from bilayer_core.errors import SimulationError
 from bilayer_core.studies.converge import study
 from bilayer_core.studies.converge.order import estimate
 from bilayer_core.studies.converge.quantities import measure
-from bilayer_core.studies.converge.study import BASE, COARSER_MESH, COARSER_STEP, FINER_STEP, planned_runs
+from bilayer_core.studies.converge.study import BASE, COARSER_MESH, COARSER_STEP, FINER_STEP, FINEST_STEP, planned_runs
 
 SMALL = ["--set", "rods.strip.stations=11", "--set", "solver.dt=4 ms", "--set", "solver.integrator=implicit_euler"]
 
@@ -110,6 +110,32 @@ def test_the_global_error_holds_a_much_finer_run():
     fine = measure(Simulator(load_scene("cantilever", [*changes, "solver.dt=0.1 ms"])), 0.08)["tip.strip/gel.z"]
     assert 0.8 < row.time.order < 1.2 and row.mesh is None
     assert 0.5 < abs(fine - row.values[BASE]) / row.bar < 1.0
+
+
+def test_a_quarter_of_the_step_is_a_third_level_whose_bar_holds_a_much_finer_run():
+    changes = ["rods.strip.stations=11", "solver.dt=4 ms", "solver.integrator=implicit_euler"]
+    scene, name = load_scene("cantilever", changes), "tip.strip/gel.z"
+    row = estimate_error(scene, 0.08, [name], workers=2, quarter=True).rows[0]
+    fine = measure(Simulator(load_scene("cantilever", [*changes, "solver.dt=0.1 ms"])), 0.08)[name]
+    assert set(row.values) == {COARSER_STEP, BASE, FINER_STEP, FINEST_STEP}
+    assert 0.8 < row.time.order < 1.2
+    assert 0.5 < abs(fine - row.values[BASE]) / row.bar < 1.0
+    assert abs(fine - row.values[FINEST_STEP]) < 0.4 * abs(fine - row.values[BASE])
+
+
+def test_an_estimate_names_what_it_cannot_see_where_friction_acts_on_an_undamped_material(capsys):
+    (unseen,) = study.unseen_errors(load_scene("crawling_inchworm"))
+    assert "materials.film.retardation_time" in unseen and "--quarter-step" in unseen
+    damped = ["materials.film.retardation_time=1 ms"]
+    assert study.unseen_errors(load_scene("crawling_inchworm", damped)) == ()
+    assert study.unseen_errors(load_scene("cantilever")) == ()
+    print_errors(study.Study("sdirk2", "adaptive", [], {}, (unseen,)))
+    assert f"Not seen: {unseen[:20]}" in capsys.readouterr().out
+
+
+def test_a_third_level_without_an_estimate_is_refused(capsys):
+    assert main(["run", "cantilever", "--quarter-step", "--quiet"]) == 2
+    assert "--quarter-step: adds a run to those of --error-estimate" in capsys.readouterr().err
 
 
 def test_a_run_with_an_estimate_is_the_run_without_and_tells_its_error(tmp_path, capsys):

@@ -25,9 +25,9 @@ from bilayer_core.studies.converge.order import Estimate, estimate
 from bilayer_core.studies.converge.quantities import check_names, headline, is_event, measure
 
 BASE = "the scene as it is"
-COARSER_STEP, FINER_STEP = "twice the step", "half the step"
+COARSER_STEP, FINER_STEP, FINEST_STEP = "twice the step", "half the step", "a quarter of the step"
 COARSER_MESH, FINER_MESH = "half the edges", "twice the edges"
-NEEDED = (BASE, FINER_STEP, FINER_MESH)
+NEEDED = (BASE, FINER_STEP, FINER_MESH, FINEST_STEP)
 LEAST_EDGES = 2
 
 
@@ -69,17 +69,37 @@ class Row:
 
 @dataclass(frozen=True)
 class Study:
-    """A finished study: integrator and steps of the scene, its rows, and why a coarser run is missing, by its name."""
+    """A finished study: integrator and steps of the scene, its rows, why a coarser run is missing, by its name, and
+    what none of the runs can see.
+    """
 
     integrator: str
     stepping: str
     rows: list[Row]
     missing: dict[str, str]
+    unseen: tuple[str, ...] = ()
 
 
-def runs_over_steps(scene: SceneConfig) -> list[Run]:
-    """Return the scene's own run, and those at twice and half its time step."""
-    others = ((COARSER_STEP, 2.0), (FINER_STEP, 0.5))
+def unseen_errors(scene: SceneConfig) -> tuple[str, ...]:
+    """Return what runs of about the same step may all miss, each with a remedy."""
+    undamped = [name for name, material in scene.materials.items() if material.retardation_time == 0.0 and _rubs(scene)]
+    if not undamped:
+        return ()
+    keys = ", ".join(f"materials.{name}.retardation_time" for name in undamped)
+    return (
+        "vibrations that all these steps leave out: friction excites them where no material damps them, and steps that "
+        f"resolve them may change strides by 10 % or more. --quarter-step adds a third level; {keys} damps them",
+    )
+
+
+def _rubs(scene: SceneConfig) -> bool:
+    law = scene.contact.friction if scene.contact is not None else None
+    return law is not None and law.acts
+
+
+def runs_over_steps(scene: SceneConfig, quarter: bool = False) -> list[Run]:
+    """Return the scene's own run, those at twice and half its time step, and one at a `quarter` on request."""
+    others = ((COARSER_STEP, 2.0), (FINER_STEP, 0.5), *(((FINEST_STEP, 0.25),) if quarter else ()))
     return [Run(BASE, (), 1.0, 1.0), *(Run(name, _with_steps(scene, part), part, 1.0) for name, part in others)]
 
 
@@ -152,6 +172,7 @@ def estimate_error(
     *,
     own: dict[str, float] | None = None,
     start: np.ndarray | None = None,
+    quarter: bool = False,
 ) -> Study:
     """Estimate the error of the headline numbers of a run due to its time steps, from runs at half and twice the step.
 
@@ -170,6 +191,8 @@ def estimate_error(
         Figures of the scene's own run (`quantities.Watch`), if it was made already.
     start : ndarray, optional
         Saved state from which every run starts; default: that of the scene.
+    quarter : bool
+        Whether to make a run at a quarter of the step as well: the order is then that of the three finest runs.
 
     Returns
     -------
@@ -183,7 +206,7 @@ def estimate_error(
     InputError
         If a quantity does not exist, or the run has none: nothing took off, a body was not touched.
     """
-    return _study(scene, runs_over_steps(scene), duration, quantities, workers, progress, own, start)
+    return _study(scene, runs_over_steps(scene, quarter), duration, quantities, workers, progress, own, start)
 
 
 def _study(
@@ -214,7 +237,7 @@ def _study(
     steps = simulator.steps
     resolution = steps.longest if steps.adaptive else steps.dt
     rows = [_row(name, found, by_name, resolution if is_event(name) else 0.0) for name in names]
-    return Study(simulator.plan.integrator, str(simulator.steps), rows, missing)
+    return Study(simulator.plan.integrator, str(simulator.steps), rows, missing, unseen_errors(scene))
 
 
 def _make(
@@ -262,6 +285,10 @@ def _row(name: str, found: dict[str, dict[str, float]], runs: dict[str, Run], re
         return estimate(sizes, (values.get(coarser), values[BASE], values[finer]))
 
     over_steps = judge(COARSER_STEP, FINER_STEP, lambda run: run.step)
+    if FINEST_STEP in values:  # what half the step is off by, and the run itself from that
+        steps, figures = zip(*((runs[run].step, values[run]) for run in (BASE, FINER_STEP, FINEST_STEP)), strict=True)
+        finer = estimate(steps, figures)
+        over_steps = replace(over_steps, order=finer.order, bar=finer.bar + abs(figures[1] - figures[0]))
     return Row(
         name,
         values,
