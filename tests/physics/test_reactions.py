@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.sample_scenes import everything, layer, rod, scene
+from support.sample_scenes import GEL, everything, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.verification.validate.reactions import cantilever, load_of_nodes
@@ -84,3 +84,19 @@ def test_looking_at_reactions_changes_no_step():
         alone.step()
         assert np.isfinite(watched.bodies["hub"].clamp_wrench).all()
     np.testing.assert_array_equal(watched.save_state(), alone.save_state())
+
+
+@pytest.mark.parametrize("thicknesses", [(1e-3, 1e-3), (2e-3, 0.5e-3)])
+@pytest.mark.parametrize("model", ["laminate", "two_rod"])
+def test_a_clamp_tells_its_moment_about_the_path_in_either_model(model, thicknesses):
+    """Between two walls the upper layer alone is strained: E w h₂ η pushes at h₂/2 over the path, the interface."""
+    swelling = {"stimulus": "heat", "gain": 1e-4}
+    layers = [layer("lower", thicknesses[0]), layer("upper", thicknesses[1], eigenstrain=swelling)]
+    arm = rod(layers, length=0.05, name="arm", clamp_start="left", clamp_end="right", stations=21)
+    walls = [fixed("left"), fixed("right", (0.05, 0, 0))]
+    heat = {"heat": {"schedule": {"type": "hold", "value": 1.0}}}
+    simulator = Simulator(load_scene(scene([arm], bodies=walls, stimuli=heat)), model=model)
+    simulator.solve_static()
+    clamp, force = simulator.clamps["arm.start"], GEL["youngs_modulus"] * arm["width"] * thicknesses[1] * 1e-4
+    assert clamp.position == pytest.approx([0, 0, 0], abs=1e-12)
+    assert np.abs(clamp.wrench[[0, 4]]) == pytest.approx([force, 0.5 * thicknesses[1] * force], rel=1e-6)
