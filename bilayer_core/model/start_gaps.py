@@ -112,7 +112,7 @@ def refuse_meeting_rods(model: Model) -> None:
     first, second = found.names(model, worst)
     depth = -1e3 * found.gap[worst]
     raise PenetrationError(
-        f"{model.scene.name}: the scene starts in penetration: "
+        f"{model.scene.name}: the scene starts in {'penetration' if depth else 'touch'}: "
         f"{first} {f'is {depth:.4g} mm inside' if depth else 'touches'} {second}"
         "; all gaps must be positive at the start (contact.rods: false lets rods pass through each other)"
     )

@@ -198,3 +198,14 @@ def hugging(coefficient):
         contact={**contact(coefficient=coefficient), "rods": True},
         damping={"mass": 20.0},
     )
+
+
+@pytest.mark.parametrize(("gap", "told"), [(0.0, "touches"), (-1e-4, "0.1 mm inside")])
+def test_rods_that_start_in_touch_or_in_each_other_are_refused_with_both_names(gap, told):
+    """`clamped` is 0.5 mm thick to either side, so is `loose`."""
+    lower = rod([layer(thickness=1e-3)], stations=21, name="clamped", clamp_start="wall", width=4e-3)
+    upper = rod([layer(thickness=1e-3)], stations=21, name="loose", start=(0, 0, 1e-3 + gap), width=4e-3)
+    laid = scene([lower, upper], bodies=[fixed("wall")], contact=contact(barrier_distance=1e-4))
+    with pytest.raises(PenetrationError) as refused:
+        Simulator(load_scene(laid))
+    assert all(text in str(refused.value) for text in ("clamped", "loose", told, "all gaps must be positive"))
