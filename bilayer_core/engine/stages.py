@@ -216,6 +216,7 @@ def predict_stage(p, state, work, inputs, n, previous, start):
     for i in range(origin.fluid_momentum.shape[0]):
         for c in range(3):
             stage.origin_fluid_momentum[i, c] = origin.fluid_momentum[i, c]
+    stage.still[0] = 0.0
     copy(origin.strain, stage.origin_strain)
     predict_directors(p.raised, origin, length, stage.predicted_director)
     _take_twist(start, stage)

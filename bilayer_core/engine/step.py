@@ -363,6 +363,7 @@ def treat_state(p, state, work, mode, length, tolerance, max_iterations):
         note_start(p.surfaces, start)
     stage.lengths[:] = length
     stand_still_stage(p, state, start, True, stage)
+    stage.still[0] = 1.0
     status = start_stage(p, start, stage)
     if status != READY:
         return _leave(p, status, -1, e)

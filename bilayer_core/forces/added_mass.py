@@ -44,6 +44,10 @@ whose Hessian is block-diagonal. z moves along with every correction of Newton, 
 any more. What is left out of the Hessian makes Newton linear instead of quadratic, by a factor of about
 h |u_t| k m₁/(m + m₁), k the largest wavenumber that bends in h; where that is not small, Newton fails and the step is
 halved.
+
+Where an equilibrium in a flow is looked for (`simulation.equilibrium`), displacements are no motion: ∂T/∂q is that of
+a body at rest, and P̄ has the directions of z, so that a body that turns on its way there does not feel the momentum
+which the flow has about it.
 """
 
 from __future__ import annotations
@@ -206,11 +210,14 @@ def update_fluid(fluid, p, at, stage):
     velocity, position, origin, h = fluid.node_velocity, at.position, stage.origin_position, stage.lengths[0]
     for i in range(velocity.shape[0]):
         for c in range(3):
-            velocity[i, c] = (position[i, c] - origin[i, c]) / h
+            velocity[i, c] = 0.0 if stage.still[0] == 1.0 else (position[i, c] - origin[i, c]) / h
     for r in range(p.raised.edge.shape[0]):
         for c in range(3):
-            fluid.director_rate[r, c] = director_moved(p.raised, at, stage, r, c) / h
+            moved = 0.0 if stage.still[0] == 1.0 else director_moved(p.raised, at, stage, r, c)
+            fluid.director_rate[r, c] = moved / h
     fluid_momentum(fluid, at)
+    if stage.still[0] == 1.0:
+        copy(fluid.momentum, stage.origin_fluid_momentum)
     for k in range(fluid.direction1.shape[0]):
         for c in range(3):
             fluid.direction1[k, c], fluid.direction2[k, c] = at.director1[k, c], at.director2[k, c]

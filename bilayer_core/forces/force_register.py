@@ -14,6 +14,7 @@ import numpy as np
 from bilayer_core.errors import ForceError
 from bilayer_core.forces.added_mass import add_added_mass, update_fluid
 from bilayer_core.forces.bend_twist import add_bending
+from bilayer_core.forces.body_drag import add_body_drag, body_flow_of
 from bilayer_core.forces.bond import add_bonds
 from bilayer_core.forces.drag import add_drag, update_directions_of_drag
 from bilayer_core.forces.elements import start_elements
@@ -34,6 +35,7 @@ from bilayer_core.forces.rod_contact import (
 from bilayer_core.forces.stretch import add_stretching
 from bilayer_core.forces.surface_barrier import add_surface_barrier, start_surface_barrier
 from bilayer_core.forces.surface_friction import add_surface_friction, settle_surface_friction, start_surface_friction
+from bilayer_core.forces.turning_drag import add_turning_drag, turning_flow_of
 from bilayer_core.forces.viscosity import add_viscosity
 from bilayer_core.jit import Record
 from bilayer_core.jit.piece import Piece
@@ -104,6 +106,8 @@ TERMS: tuple[Term, ...] = (
     Term(("inertia", "damping", "gravity"), lambda model, of: None, add_inertial_forces),
     Term(("inertia", "damping", "gravity"), lambda model, of: of["raised"], add_raised_masses),
     Term(("loads",), lambda model, of: of["loads"], add_point_forces, start_dead_loads),
+    Term(("body drag",), lambda model, of: body_flow_of(model), add_body_drag),
+    Term(("turning drag",), lambda model, of: turning_flow_of(model), add_turning_drag),
     Term(("barrier", "restitution"), lambda model, of: of["surfaces"], add_surface_barrier, start_surface_barrier),
     Term(
         ("restitution",),

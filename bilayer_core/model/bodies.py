@@ -13,6 +13,9 @@ from bilayer_core.model.strands import Collected
 from bilayer_core.scene.body import Body, Free, Guided, Prescribed
 from bilayer_core.scene.config import SceneConfig
 
+ROLL_OF_BODY = 0.25
+"""Of the moment of an edge about the path, what a body without mass has that holds the edge's end."""
+
 
 def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = None) -> tuple[PlacedBodies, Bodies]:
     """Return the bodies of a scene, and their numbers and inertia; free ones move in `plane` alone if one is given."""
@@ -30,6 +33,7 @@ def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = Non
     free_index = np.full(count + 1, -1, dtype=np.int64)
     free_index[free] = np.arange(len(free))
     held = _inertia_of_held(found, count)
+    _hand_over_roll(scene, found)
     moments = np.array([_second_moment(scene.bodies[i], shapes[i], held[i]) for i in free]).reshape(len(free), 3, 3)
     mass = np.array([scene.bodies[index].motion.mass for index in free], dtype=float)
     freedom = np.concatenate(allowed, axis=1) if free else np.zeros((0, 0))
@@ -97,17 +101,36 @@ def _inertia_of_held(found: Collected, count: int) -> np.ndarray:
 
         I t tᵀ + (m l²/3 + I/2) (1 − t tᵀ)
 
-    (of its section the mean of both directions across). Its mass is that of its node, which moves with the body.
+    (of its section the mean of both directions across). Its mass is that of its node, which moves with the body. Of the
+    moment about the path a body has the part that is nearer to it than to the middle of the edge, `ROLL_OF_BODY` of the
+    whole edge's; the rest is the edge's own.
     """
     inertia = np.zeros((count, 3, 3))
     node, tangents = found.column("attached_node", np.int64), found.column("clamp_edge_tangent", width=3)
     edge = found.column("node_edges", np.int64, 2)[node, 0]
-    along = 0.5 * found.column("spin_inertia")[edge]
-    across = found.column("edge_mass")[edge] * found.column("rest_length")[edge] ** 2 / 24.0 + 0.5 * along
+    roll = found.column("spin_inertia")[edge]
+    along = ROLL_OF_BODY * roll
+    across = found.column("edge_mass")[edge] * found.column("rest_length")[edge] ** 2 / 24.0 + 0.25 * roll
     on_axis = tangents[:, :, None] * tangents[:, None]
     held = along[:, None, None] * on_axis + across[:, None, None] * (np.eye(3) - on_axis)
     np.add.at(inertia, found.column("attached_body", np.int64), held)
     return inertia
+
+
+def _hand_over_roll(scene: SceneConfig, found: Collected) -> None:
+    """Take from the edges next to bodies without mass the moment about the path that these bodies have of them."""
+    node, body = found.column("attached_node", np.int64), found.column("attached_body", np.int64)
+    without = np.array([_moves_with_rods(one) for one in scene.bodies], dtype=bool)
+    edge = found.column("node_edges", np.int64, 2)[node[without[body]], 0]
+    spin_inertia = found.column("spin_inertia").copy()
+    np.subtract.at(spin_inertia, edge, ROLL_OF_BODY * found.column("spin_inertia")[edge])
+    found.columns["spin_inertia"] = [spin_inertia]
+
+
+def _moves_with_rods(body: Body) -> bool:
+    """Return whether the inertia of a body is that of the half edges it holds."""
+    motion = body.motion
+    return not isinstance(motion, Prescribed) and motion.turns and motion.inertia is None and motion.mass == 0.0
 
 
 def _second_moment(body: Body, shape: Shape | None, of_held: np.ndarray) -> np.ndarray:

@@ -58,7 +58,9 @@ def fingerprint_of(scene: SceneConfig, model: str, history: str) -> Array:
             for name, c in scene.stimuli.items()
         ],
         "rods": [_without("friction_axis", rod) for rod in whole["rods"]],
-        "bodies": [body | {"surface": _without("grain", body["surface"])} for body in whole["bodies"]],
+        "bodies": [
+            _without("drag", body) | {"surface": _without("grain", body["surface"])} for body in whole["bodies"]
+        ],
         "masses": whole["masses"],
         "obstacles": [_without("grain", obstacle) for obstacle in whole["obstacles"]],
         "coupling": whole["coupling"] if model == "two_rod" else None,

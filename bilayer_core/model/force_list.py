@@ -119,6 +119,20 @@ def _bodies(q: Question) -> str | None:
     return _unless(any(not isinstance(body.motion, Prescribed) for body in q.scene.bodies), "no free body")
 
 
+def _body_drag(q: Question) -> str | None:
+    if q.scene.fluid is None:
+        return "no fluid"
+    return _unless(any(body.drag is not None for body in q.scene.bodies), "no body has `drag`")
+
+
+def _turning_drag(q: Question) -> str | None:
+    if q.scene.fluid is None:
+        return "no fluid"
+    if q.dimension == 2:
+        return "nothing turns about its axis in a plane"
+    return _unless(q.scene.fluid.drag_turning > 0.0, "ribbons turn about their axis freely: fluid.drag_turning is zero")
+
+
 def _added_mass(q: Question) -> str | None:
     if q.scene.fluid is None:
         return "no fluid"
@@ -192,6 +206,8 @@ FORCES: tuple[Force, ...] = (
         lambda q: _unless(any(any(load.moment) for load in q.scene.loads), "no moment on a body"),
     ),
     Force("drag", DISSIPATIVE, "drag.py", lambda q: _unless(q.scene.fluid is not None, "no fluid"), on_nodes=True),
+    Force("body drag", DISSIPATIVE, "body_drag.py", _body_drag),
+    Force("turning drag", DISSIPATIVE, "turning_drag.py", _turning_drag),
     Force("added mass", INERTIAL, "added_mass.py", _added_mass, on_nodes=True),
     Force(
         "barrier",

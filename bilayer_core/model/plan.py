@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from bilayer_core.errors import SceneError
 from bilayer_core.model.colliders import ContactPair, contact_pairs, is_ribbon
+from bilayer_core.model.dragged_bodies import dry_bodies
 from bilayer_core.model.findings import few, told
 from bilayer_core.model.force_list import planned
 from bilayer_core.model.free_motions import mechanisms_of
@@ -110,6 +111,7 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
                 *passing_warnings(scene),
                 *_warnings_of(scene, chosen_model, chosen_dimension),
                 *advice(scene),
+                *dry_bodies(scene),
             ]
         ),
     )

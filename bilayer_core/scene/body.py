@@ -17,8 +17,10 @@ from bilayer_core.scene.units import (
     NonNegativeMass,
     NonNegativeTime,
     PositiveAngularSpeed,
+    PositiveArea,
     PositiveInertia,
     PositiveLength,
+    PositiveNumber,
     PositiveSpeed,
     Speed,
 )
@@ -170,6 +172,15 @@ class ContactPoint(Part):
     """From the point to the body's face."""
 
 
+class BodyDrag(Part):
+    """Resistance of a fluid to the motion of a body, the same in all directions."""
+
+    coefficient: PositiveNumber
+    """C in ½ × density × C × area × speed²; 0.47 is that of a ball."""
+    area: PositiveArea | None = None
+    """Area that the fluid presses on; by default the mean shadow of its surface, a quarter of the area of that."""
+
+
 class Body(Part):
     """A rigid body."""
 
@@ -185,6 +196,8 @@ class Body(Part):
     """What others touch; without one nothing does."""
     contact_points: list[ContactPoint] = []
     """Points by which the body itself touches surfaces."""
+    drag: BodyDrag | None = None
+    """Of the fluid on a free or guided body; none by default."""
 
 
 def faults_of_guided(motion: Guided) -> list[Fault]:

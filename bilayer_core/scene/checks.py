@@ -24,6 +24,7 @@ class SceneConfig(Protocol):
     loads: tuple
     materials: dict
     stimuli: dict
+    fluid: object
 
 
 def faults_of_scene(scene: SceneConfig) -> list[Fault]:
@@ -33,7 +34,7 @@ def faults_of_scene(scene: SceneConfig) -> list[Fault]:
         return too_large
     references = list(_references(scene))
     rest_lengths = [] if references else _rest_lengths(scene)
-    parts = _clamps(scene), _joints(scene), _surfaces(scene), _points(scene)
+    parts = _clamps(scene), _joints(scene), _surfaces(scene), _points(scene), _drags(scene)
     return [*_names(scene), *references, *rest_lengths, *(fault for faults in parts for fault in faults)]
 
 
@@ -68,6 +69,24 @@ def _references(scene: SceneConfig) -> Iterator[Fault]:
                 if channel not in scene.stimuli:
                     demand = one_of("stimuli", channel, scene.stimuli)
                     yield ("rods", number, "pattern", "stimuli", name, copy), channel, demand
+
+
+def _drags(scene: SceneConfig) -> Iterator[Fault]:
+    """Yield a fault for each drag of a body that nothing would make use of, or that has no area."""
+    for index, body in enumerate(scene.bodies):
+        if body.drag is None:
+            continue
+        where: Location = ("bodies", index, "drag")
+        if scene.fluid is None:
+            yield where, body.drag.coefficient, "must be left out: there is no `fluid`"
+        elif body.motion.type == "prescribed":
+            yield where, body.drag.coefficient, "must be left out: the motion of the body is prescribed"
+        elif body.drag.area is None and (body.surface is None or body.surface.shape == "plane"):
+            yield (
+                (*where, "area"),
+                None,
+                "must be given (an area [m^2], such as 3 cm^2): the body has no surface of a size",
+            )
 
 
 def _rest_lengths(scene: SceneConfig) -> Iterator[Fault]:

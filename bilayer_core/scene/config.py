@@ -177,6 +177,9 @@ class Fluid(Part):
     """Coefficient for motion along the tangent, with the width as area per length."""
     drag_across: NonNegativeNumber
     """Coefficient for motion across: with the width through the thickness, with the thickness sideways."""
+    drag_turning: NonNegativeNumber = 0.0
+    """Coefficient for ribbons that turn about their axis, a plate whose points move across it: per length the moment
+    density × this × width⁴/64 × spin². None by default; 2 is that of a plate."""
     added_mass: Annotated[
         AddedMass | None, BeforeValidator(_with_or_without, json_schema_input_type=AddedMass | bool | None)
     ] = None

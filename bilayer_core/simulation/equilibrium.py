@@ -5,7 +5,8 @@ that forgets all velocity (the proximal point method). Whatever h is, V falls in
 where ∂V/∂q = 0; h grows tenfold while Newton's method succeeds, so that the last rounds are Newton's method on V alone.
 What depends on velocities vanishes there: friction, mass damping, and drag but for that of a fluid which flows.
 Forces that turn with what they act on, moments on bodies and light are taken at q_k and agree with the shape in the
-end. Whether the equilibrium is stable is asked of V with these as they are there.
+end. Whether the equilibrium is stable is asked of V, or of the modes of small motions where forces have no potential
+(`simulation.growing_modes`).
 """
 
 from __future__ import annotations
@@ -17,17 +18,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bilayer_core.engine.engine import Engine
 from bilayer_core.engine.request_modes import COUNT, SETTLE
 from bilayer_core.engine.step_outcome import FAILURES, IntegrationReport
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.model.lit_elements import light_of, part_seen
+from bilayer_core.model.model import Model
 from bilayer_core.model.records.status import CROSSED, MAX_ITERATIONS
 from bilayer_core.model.state import NOT_KNOWN, State
 from bilayer_core.simulation.crossing_remedy import crossed, edge_of_strand
+from bilayer_core.simulation.growing_modes import growing_modes
 from bilayer_core.simulation.stepper import Stepper
 
 FIRST, GROWTH, SHRINKAGE, SHORTEST = 1e-2, 10.0, 0.25, 1e-7
 """Length h of the first round [s], its factors after success and failure, and the length at which to give up [s]."""
+CAREFUL_GROWTH = 1.3
+"""In place of growth once a round has failed, where forces turn with what they act on. Their part of the stiffness is
+not in the Hessian, so Newton converges for lengths h alone in which inertia outweighs it; rest is reached round by
+round."""
 SETTLED, LONGEST = 1.0, 100.0
 """Two rounds at least so long [s] must find the shape at rest, one after the other but for failures, which come
 from rounding where nothing holds the robot; no round is longer than the second."""
@@ -49,11 +57,15 @@ class StaticReport:
     stable : bool
         Whether every small disturbance decays or stays as it is, in all of space, whatever the dimension of the model.
     unstable_directions : int
-        Dimension of the space of those that grow: negative eigenvalues of the Hessian.
+        Dimension of the space of those that grow: negative eigenvalues of the Hessian, or modes that grow.
     out_of_plane : int
         How many of these leave the plane of a model of dimension 2, which therefore cannot follow them; 0 in space.
     residual : float
         Largest displacement that Newton would still make [m].
+    growth_rate, growth_frequency : float
+        Of the small motion that grows fastest, where forces without a potential act (`growing_modes`): its rate [1/s],
+        and the frequency with which it flutters [Hz], 0 where it diverges. Both are 0 where all is stable, and where
+        forces have a potential, whose Hessian tells no rates.
     rounds, iterations, factorisations : int
         Potentials minimised, Newton corrections, and factorised Hessians.
     """
@@ -65,6 +77,8 @@ class StaticReport:
     rounds: int
     iterations: int
     factorisations: int
+    growth_rate: float = 0.0
+    growth_frequency: float = 0.0
 
 
 def solve_static(
@@ -106,6 +120,23 @@ def solve_static(
     return report
 
 
+def follows(model: Model) -> bool:
+    """Return whether forces that have no potential act at rest: followers, moments, or a flow."""
+    flowing = model.flow.exists and bool(np.any(model.flow.velocity))
+    return model.followers.exists or model.moments.exists or flowing
+
+
+def _carries_flow(model: Model) -> bool:
+    """Return whether a flow has momentum about added mass: that is in no matrix of modes either."""
+    return model.fluid.exists and bool(np.any(model.fluid.velocity))
+
+
+def _rods_touch(engine: Engine) -> bool:
+    """Return whether rods touch each other where they were evaluated last: that is in no matrix of modes."""
+    contact = engine.rod_contact
+    return contact.exists and contact.contacts.count[0] > 0
+
+
 class _Search:
     """Rounds of the compiled step's modes for statics, and what to make of them."""
 
@@ -137,6 +168,7 @@ class _Search:
         self.light = light_of(model)
         self._drive(stepper)
         self.rounds = self.iterations = self.factorisations = 0
+        self.growth_after_failure = CAREFUL_GROWTH if follows(model) else GROWTH
 
     def _drive(self, stepper: Stepper) -> None:
         """Have the rest strains and the loads of now, and the light on the present shape, in a stepper."""
@@ -152,7 +184,7 @@ class _Search:
     def run(self) -> StaticReport:
         state, engine = self.state, self.stepper.engine
         first_position, start = state.position.copy(), state.copy()
-        length, moved, settled = FIRST, math.inf, 0
+        length, moved, settled, growth = FIRST, math.inf, 0, GROWTH
         while self.rounds < MAX_ROUNDS:
             if self.light.exists:
                 self._drive(self.stepper)
@@ -172,13 +204,16 @@ class _Search:
                 raise self._failure("nothing holds the robot, or not all of it", moved)
             start.take(state)
             if not attempt.converged:  # V has fallen all the same
-                length, settled = SHRINKAGE * length, 0
+                length, settled, growth = SHRINKAGE * length, 0, self.growth_after_failure
                 continue
             settled = settled + 1 if moved <= self.tolerance and length >= SETTLED else 0
             if settled == 2:
                 return self._report(attempt.residual * length)
-            length = min(GROWTH * length, LONGEST)
-        raise self._failure("the shape does not come to rest", moved)
+            length = max(SETTLED, length) if moved <= self.tolerance else min(growth * length, LONGEST)
+        hint = (
+            ": forces that follow it have no potential; a run may come to rest" if follows(self.stepper.model) else ""
+        )
+        raise self._failure(f"the shape does not come to rest{hint}", moved)
 
     def _why(self, attempt: IntegrationReport) -> str:
         """Why a round failed."""
@@ -188,15 +223,23 @@ class _Search:
         return f"edge {edge_of_strand(self.stepper.model, edge)} goes through {surface} between its nodes"
 
     def _report(self, residual: float) -> StaticReport:
+        rate = frequency = 0.0
         unstable, out_of_plane = self._unstable(self.stepper), 0
+        space = self.stepper
         if self.in_space is not None:
             space = self.in_space()
             self._drive(space)
             in_plane, unstable = unstable, self._unstable(space)
             out_of_plane = unstable - in_plane
+        if follows(space.model) and not (_rods_touch(space.engine) or _carries_flow(space.model)):
+            load_factor = self.stepper.surroundings.load_factor(self.state)
+            grows = growing_modes(space.model, self.state, load_factor)
+            unstable, rate, frequency = grows.count, grows.rate, grows.frequency
+            if unstable and self.in_space is not None:
+                out_of_plane = unstable - growing_modes(space.model, self.state, load_factor, self.stepper.model).count
         self.stepper.restart(self.state)
         counts = self.rounds, self.iterations, self.factorisations
-        return StaticReport(unstable == 0, unstable, out_of_plane, residual, *counts)
+        return StaticReport(unstable == 0, unstable, out_of_plane, residual, *counts, rate, frequency)
 
     def _unstable(self, stepper: Stepper) -> int:
         """Return the number of negative eigenvalues of the Hessian of a model at the equilibrium."""

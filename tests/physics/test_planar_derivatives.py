@@ -10,7 +10,7 @@ from bilayer_core.model.plan import MODELS
 
 ELASTIC = ("stretching", "bending", "bond")
 IDLE = ("rod barrier", "rod friction")  # nothing in this scene touches: see below
-ALONE = [force.name for force in FORCES if force.kind is not None and force.name not in ("twisting", *IDLE)]
+ALONE = [force.name for force in FORCES if force.kind is not None and force.name not in ("twisting", "turning drag", *IDLE)]
 
 
 def of_everything(ahead, hub, seed, model):

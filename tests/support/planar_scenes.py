@@ -47,7 +47,7 @@ def everything_in_plane(ahead, hub="prescribed", stations=6):
         stimuli={"humidity": {"schedule": {"type": "hold", "value": 0.5}}},
         bodies=[
             fixed("hub", (0, 0, 0.0425), rotation=turn_to(ahead), contact_points=[point]) | {"motion": HUBS[hub]},
-            ball((0, 0, 0.0209), shell=True),
+            ball((0, 0, 0.0209), shell=True) | {"drag": {"coefficient": 0.47}},
         ],
         obstacles=[GROUND],
         contact=law,

@@ -32,17 +32,19 @@ def everything(stations=6):
     ]
     loads[0]["schedule"] = loads[3]["schedule"] = {"type": "sine", "mean": 1, "amplitude": 0.5, "period": 0.1}
     uneven["restitution"] = 0.5
+    dragged = {"drag": {"coefficient": 0.47}}
     uneven["friction"] |= {"forward": 0.3, "backward": 0.6, "sideways": 0.4}
     return scene(
         [arm],
         gravity=[0.3, 0.2, -10.0],
         stimuli={"humidity": {"schedule": {"type": "hold", "value": 0.5}}},
-        bodies=[fixed("hub", (0, 0, 0.0425), contact_points=[point]), ball((0, 0, 0.0209), shell=True)],
+        bodies=[fixed("hub", (0, 0, 0.0425), contact_points=[point]), ball((0, 0, 0.0209), shell=True) | dragged],
         obstacles=[GROUND],
         contact=uneven,
         damping={"mass": 2.0},
         materials={"gel": {**GEL, "retardation_time": 1e-3}},
-        fluid={"drag_along": 0.3, "drag_across": 1.2, "velocity": [0.1, -0.2, 0.05], "added_mass": True},
+        fluid={"drag_along": 0.3, "drag_across": 1.2, "velocity": [0.1, -0.2, 0.05], "added_mass": True}
+        | {"drag_turning": 2.0},
         joints=[
             {
                 "name": "knee",

@@ -10,7 +10,7 @@ from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.closed_forms import kirchhoff_plate
 from bilayer_core.verification.validate.motion import let_go
-from bilayer_core.verification.validate.parts import GEL, layer, rod, scene
+from bilayer_core.verification.validate.parts import GEL, contact, fixed, layer, rod, scene
 from bilayer_core.verification.validate.validation_case import Case
 
 WIDTH, THICKNESS, DENSITY = 0.01, 2e-3, 1000.0
@@ -57,7 +57,57 @@ def munk(across: float) -> tuple[float, float]:
     return math.atan2(chord[2], chord[0]), expected
 
 
+def turning(layers: list[dict]) -> tuple[float, float]:
+    """Spin [rad/s] of a free strip that turns about its axis, after 0.1 s: ω₀/(1 + ω₀ c t/J) under the moment c ω²."""
+    coefficient, spin, time = 2.0, 50.0, 0.1
+    water = {"drag_along": 0.0, "drag_across": 0.0, "drag_turning": coefficient}
+    content = scene([rod(layers, LENGTH, EDGES + 1)], fluid=water, solver={"dimension": 3, "dt": 1e-3})
+    simulator = Simulator(load_scene(content), integrator="sdirk2")
+    model = simulator.model
+    simulator._state.spin[:] = spin
+    let_go(simulator, np.cross([spin, 0.0, 0.0], model.start_position))
+    simulator.run(time)
+    moment = DENSITY * coefficient * WIDTH**4 / 64.0
+    inertia = OWN * (WIDTH**2 + THICKNESS**2) / 12.0
+    return float(simulator._state.spin.mean()), spin / (1.0 + spin * time * moment / inertia)
+
+
+def sinking_ball() -> tuple[float, float]:
+    """Speed [m/s] of a ball that has fallen through a fluid for 0.2 s: v tanh(g t/v), v its terminal speed."""
+    radius, mass, coefficient, gravity, time = 0.01, 6e-3, 0.47, 9.81, 0.2
+    ball = {
+        "name": "ball",
+        "position": [0.0, 0.0, 0.5],
+        "motion": {"type": "free", "mass": mass},
+        "surface": {"shape": "sphere", "radius": radius},
+        "drag": {"coefficient": coefficient},
+    }
+    content = scene(
+        [rod(WHOLE, LENGTH, EDGES + 1, clamp_start="wall")],
+        bodies=[fixed("wall"), ball],
+        contact=contact(),
+        fluid={"drag_along": 0.0, "drag_across": 0.0},
+        gravity=[0.0, 0.0, -gravity],
+        solver={"dt": 1e-3},
+    )
+    simulator = Simulator(load_scene(content), integrator="sdirk2")
+    simulator.run(time)
+    terminal = math.sqrt(2.0 * mass * gravity / (DENSITY * coefficient * math.pi * radius**2))
+    return -float(simulator._state.body_velocity[1, 2]), terminal * math.tanh(gravity * time / terminal)
+
+
 CASES = [
+    *(
+        Case(
+            f"fluid/turning strip/{name}",
+            "ω₀/(1 + ω₀ c t/J), c = ρ C w⁴/64 per length",
+            1e-3,
+            lambda layers=layers: turning(layers),
+            "rad/s",
+        )
+        for name, layers in (("one layer", WHOLE), ("two layers", HALVES))
+    ),
+    Case("fluid/sinking ball", "v tanh(g t/v), v = √(2 m g/ρ C π r²)", 1e-4, sinking_ball, "m/s"),
     *(
         Case(
             f"fluid/acceleration/{direction}, {name}",
