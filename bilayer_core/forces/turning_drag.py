@@ -32,7 +32,7 @@ TURNING_DRAG = slot_of("turning drag")
 
 @record
 class TurningFlow:
-    """What turns against a fluid."""
+    """Resistance of edges that turn against a fluid."""
 
     coefficient: Vector  # c of each edge [kg m²], shape (n_edge,)
 

@@ -1,4 +1,4 @@
-"""What a wide strip does that a beam does not: it is a plate, whose section may bend.
+"""Plates: the curvature and stiffness of strips so wide that their section bends, which that of a beam does not.
 
 In a strip of width w, thickness H and Poisson's ratio ν, curved by κ, the section bends to u(y): D u⁗ + E H κ² u = 0,
 with free borders. For uniform material the energy per length has the closed form (τ = 0; κ̄ of a plate that swells

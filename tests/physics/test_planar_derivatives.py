@@ -10,7 +10,8 @@ from bilayer_core.model.plan import MODELS
 
 ELASTIC = ("stretching", "bending", "bond")
 IDLE = ("rod barrier", "rod friction")  # nothing in this scene touches: see below
-ALONE = [force.name for force in FORCES if force.kind is not None and force.name not in ("twisting", "turning drag", *IDLE)]
+IN_SPACE = ("twisting", "turning drag")
+ALONE = [force.name for force in FORCES if force.kind is not None and force.name not in (*IN_SPACE, *IDLE)]
 
 
 def of_everything(ahead, hub, seed, model):
