@@ -116,9 +116,9 @@ def test_a_slow_release_does_not_make_it_jump():
         (TWO_RODS, "solver.integrator=sdirk2", "solver.dt=0.25 ms"),
     ],
 )
-def test_the_rise_falls_into_place_with_shorter_steps_of_any_integrator_and_either_model(change):
+def test_without_a_damping_the_rise_scatters_by_a_few_percent_about_one_value(change):
     _, flight = watched(*change)
-    assert flight.rise == pytest.approx(0.351, rel=0.015)  # 0.3508 of SDIRK2 at 0.06 ms, 0.3503 of TR-BDF2 at 0.03 ms
+    assert flight.rise == pytest.approx(0.354, rel=0.05)  # 344 to 371 mm over 14 step lengths: see docs/robots.md
 
 
 @pytest.mark.parametrize(
@@ -128,6 +128,7 @@ def test_the_rise_falls_into_place_with_shorter_steps_of_any_integrator_and_eith
         ("solver.tolerance=1e-5",),
         ("solver.tolerance=1e-6",),
         *((f"solver.integrator={name}", "solver.dt=0.125 ms") for name in ("sdirk2", "tr_bdf2", "generalised_alpha")),
+        (TWO_RODS, "solver.integrator=sdirk2", "solver.dt=0.125 ms"),
     ],
 )
 def test_with_a_film_that_damps_the_rise_has_a_limit(change):
