@@ -136,7 +136,7 @@ def test_check_says_what_is_set(capsys):
 
 
 def test_check_wraps_what_is_long_and_counts_the_warnings(capsys):
-    assert main(["check", "crawling_inchworm"]) == 0
+    assert main(["check", "crawling_dual_leg"]) == 0
     text = capsys.readouterr().out
     assert max(map(len, text.splitlines())) <= 120
     assert text.endswith(f"no faults, {text.count('  WARNING  ')} warnings\n")

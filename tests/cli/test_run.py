@@ -54,8 +54,8 @@ def test_a_run_leaves_log_and_summary_and_tells_what_happened(here, capsys):
     assert told.startswith(f"cantilever: completed, 0.05 s in {summary['steps']} steps\n")
     assert f"  stepping              {summary['stepping']} ({summary['reasons']['stepping']})\n" in told
     assert "real-time factor" in told and "run.mcap" in told
-    assert f"  largest curvature     {summary['max_curvature']:.3g} 1/m in the run\n" in told
-    assert "% in the run, of an edge without its eigenstrain\n" in told
+    assert f"  largest curvature     {summary['max_curvature']:.3g} 1/m in the run, times thickness " in told
+    assert "% of an outermost fibre, " in told and "% of an edge, without eigenstrain\n" in told
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,7 @@ def test_a_cycle_of_the_inchworm_is_that_in_space(model):
 def test_with_contact_and_friction_of_bodies_all_moves_as_in_space(ahead):
     space, plane = pair(everything_in_plane(AHEAD[ahead], "free"))
     for simulator in (space, plane):
-        simulator.run(0.03)
+        simulator.run(0.05)
     assert plane.energy()["barrier"] > 0.0
     assert np.abs(plane.bodies["ball"].quaternion[:2]).max() > 1e-4  # it turns
     assert difference(space, plane) < SAME
