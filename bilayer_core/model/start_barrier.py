@@ -39,7 +39,7 @@ def start_warnings(model: Model) -> Iterator[Finding]:
         own = [pair for pair in pairs if part in pair[:2]]
         if not own or mass == 0.0:
             continue
-        energy = sum(model.contact_stiffness * weight * barrier(gap, distance) for _, _, weight, gap, _ in own)
+        energy = sum(model.contact_stiffness * weight * barrier.py_func(gap, distance) for _, _, weight, gap, _ in own)
         *_, gap, place = min(own, key=lambda pair: pair[3])
         if energy <= mass * gravity * distance:
             continue
