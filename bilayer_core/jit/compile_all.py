@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Collection
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 
@@ -160,7 +161,7 @@ class _Worker(threading.Thread):
         )
         if self._ended:
             self._process.terminate()
-        with self._process as process:
+        with suppress(BrokenPipeError), self._process as process:  # one that was ended reads no more
             while (name := self._next()) is not None:
                 try:
                     print(name, file=process.stdin, flush=True)

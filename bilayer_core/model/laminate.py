@@ -316,17 +316,19 @@ def _add_eigenstrain(
             weight, bend = whole.driven(part, covered & np.isin(cells.edge, driven))
             weight = weight[:, driven]
             of_edges.append((first_edge + driven, np.full(weight.shape, number), weight))
-            of_joints.append((joints, np.full(bend.shape, number), bend))
+            bent = (bend != 0.0) & (joints >= 0)
+            copy, _ = np.nonzero(bent)
+            of_joints.append((copy, joints[bent], np.full(len(copy), number), bend[bent]))
     if not of_edges:
         return
     edge, law_of_edge, weight = (np.concatenate(part, axis=1) for part in zip(*of_edges, strict=True))
-    joint, law_of_joint, bend = (np.concatenate(part, axis=1) for part in zip(*of_joints, strict=True))
-    bent = (bend != 0.0) & (joint >= 0)
+    copy, joint, law_of_joint, bend = (np.concatenate(part) for part in zip(*of_joints, strict=True))
+    by_copy = np.argsort(copy, kind="stable")
     found.add(
         driven_edge=edge.ravel(),
         driven_law=law_of_edge.ravel(),
         driven_weight=weight.ravel(),
-        driven_joint=joint[bent],
-        driven_joint_law=law_of_joint[bent],
-        driven_joint_weight=bend[bent],
+        driven_joint=joint[by_copy],
+        driven_joint_law=law_of_joint[by_copy],
+        driven_joint_weight=bend[by_copy],
     )

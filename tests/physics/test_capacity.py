@@ -9,7 +9,7 @@ from support.sample_scenes import GROUND, contact, fixed, layer, rod, scene
 from bilayer_core import Simulator, load_scene
 from bilayer_core.engine import capacity, storage
 from bilayer_core.errors import PenetrationError, SceneError, SimulationError
-from bilayer_core.model import rod_penetration, rod_surfaces
+from bilayer_core.model import rod_surfaces, start_gaps
 from bilayer_core.model.build_model import build_model
 from bilayer_core.model.records.status import PAIR_CAPACITY_EXCEEDED
 from bilayer_core.verification.stress.all_cases import all_cases
@@ -110,7 +110,7 @@ def test_the_limit_of_points_is_on_those_of_all_rods_together(monkeypatch):
 def test_rods_that_start_in_each_other_at_many_places_are_refused(monkeypatch):
     messages = []
     for most in (1_000_000, 5):
-        monkeypatch.setattr(rod_penetration, "MOST_SHOWN", most)
+        monkeypatch.setattr(start_gaps, "MOST_SHOWN", most)
         with pytest.raises(PenetrationError, match="the scene starts in penetration") as refusal:
             Simulator(load_scene(falling(gap=0.5e-3)))
         messages.append(str(refusal.value))

@@ -64,7 +64,7 @@ def test_works_of_all_that_drives_and_damps_are_in_the_account(model, integrator
     content = everything()
     content["contact"].pop("restitution")  # whose power the budget takes at the ends of steps alone
     content["stimuli"]["humidity"]["schedule"] = {"type": "ramp", "start": 0, "end": 0.02, "from": 0, "to": 0.1}
-    simulator = Simulator(load_scene(content), dt=1e-4, integrator=integrator, model=model, budget=True)
+    simulator = Simulator(load_scene(content), dt=1.25e-5, integrator=integrator, model=model, budget=True)
     simulator.run(0.02)
     budget = simulator.budget()
     works = sum(abs(work) for rows in ("supplied", "lost") for work in budget[rows].values())
