@@ -127,7 +127,7 @@ def bent(turn, thickness=2e-3, **more):
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_the_outermost_fibre_of_a_strip_in_pure_bending_strains_by_half_its_thickness_times_the_curvature(dimension):
+def test_the_outermost_fibre_in_pure_bending_strains_by_half_thickness_times_curvature(dimension):
     """κ = M/EI everywhere: 40 1/m, on 2 mm."""
     simulator = Simulator(load_scene(bent(2.0)), dimension=dimension)
     simulator.solve_static()
