@@ -31,6 +31,7 @@ _DEGREE = Decimal("0.01745329251994329576923690768")
 USUAL_UNITS = {
     "1": {"%": Decimal("1e-2")},
     "m": {"m": Decimal(1), "cm": Decimal("1e-2"), "mm": Decimal("1e-3"), "µm": Decimal("1e-6"), "um": Decimal("1e-6")},
+    "m^2": {"m^2": Decimal(1), "cm^2": Decimal("1e-4"), "mm^2": Decimal("1e-6")},
     "s": {"s": Decimal(1), "ms": Decimal("1e-3"), "µs": Decimal("1e-6"), "us": Decimal("1e-6")},
     "kg": {"kg": Decimal(1), "g": Decimal("1e-3"), "mg": Decimal("1e-6")},
     "kg/m^3": {"kg/m^3": Decimal(1), "g/cm^3": Decimal(1000)},
