@@ -9,6 +9,8 @@ from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).resolve().parents[1]
 CACHES = ROOT / ".pytest_cache" / "kernels"
+if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):  # else a thousand processes compile all sources anew
+    os.environ.setdefault("PYTHONPYCACHEPREFIX", str(ROOT / ".pytest_cache" / "bytecode"))
 
 
 def _use_own_kernel_cache() -> None:

@@ -26,7 +26,7 @@ HELD = 0.1
 
 def stiffness_that_holds(energy_per_length: float, distance: float) -> float:
     """K_c [Pa] of a barrier of a distance d̂ [m] that takes up so much [J/m] down to d̂/10, to a digit, rounded up."""
-    needed = max(energy_per_length / barrier(HELD * distance, distance), sys.float_info.min)
+    needed = max(energy_per_length / barrier.py_func(HELD * distance, distance), sys.float_info.min)
     digit = 10.0 ** math.floor(math.log10(needed))
     return math.ceil(needed / digit) * digit
 
@@ -49,7 +49,7 @@ def impact_warnings(model: Model) -> Iterator[Finding]:
     contact = model.scene.contact
     for what, mass, length, speed in _approaching(model):
         energy = 0.5 * mass / length * speed**2
-        held = model.contact_stiffness * barrier(HELD * contact.barrier_distance, contact.barrier_distance)
+        held = model.contact_stiffness * barrier.py_func(HELD * contact.barrier_distance, contact.barrier_distance)
         if energy <= held:
             continue
         stiffness = stiffness_that_holds(energy, contact.barrier_distance)

@@ -18,10 +18,10 @@ spring does. The figures hold one width away from clamps.
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 Array = np.ndarray
 SMALL = 0.05
@@ -32,6 +32,9 @@ RATIOS = np.geomspace(0.05, 1e4, 400)
 """w²κ̄/H between which curvatures are interpolated."""
 CURVATURES = np.linspace(0.01, 1.6, 1600)
 """Of κ/κ̄, where tangents are looked at."""
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+SECTIONS = 32
+"""Golden sections, which leave 1e-7 of κ̄."""
 
 
 def _factor(ratio: Array, poisson: float) -> Array:
@@ -42,14 +45,14 @@ def _factor(ratio: Array, poisson: float) -> Array:
     return np.where(psi < SMALL, 1.0 - psi**4 / 180.0, np.where(psi > LARGE, 2.0 / np.maximum(psi, LARGE), g))
 
 
-def swollen_energy(curvature: Array, ratio: float, poisson: float) -> Array:
+def swollen_energy(curvature: Array, ratio: float | Array, poisson: float) -> Array:
     """Return U/(½ w D κ̄²) of a strip that swells alike in all directions.
 
     Parameters
     ----------
     curvature : ndarray
         κ/κ̄, above 0.
-    ratio : float
+    ratio : float or ndarray
         w²κ̄/H.
     poisson : float
         ν.
@@ -62,13 +65,12 @@ def swollen_energy(curvature: Array, ratio: float, poisson: float) -> Array:
 @lru_cache(maxsize=32)
 def _rests(poisson: float) -> Array:
     """κ/κ̄ at rest for each of `RATIOS`."""
-    bounds = (0.5, 1.05 + poisson) if poisson > 0.0 else (0.5, 1.05)
-    return np.array(
-        [
-            minimize_scalar(lambda x, r=r: swollen_energy(x, r, poisson), bounds=bounds, options={"xatol": 1e-7}).x
-            for r in RATIOS
-        ]
-    )
+    low, high = np.full(RATIOS.size, 0.5), np.full(RATIOS.size, 1.05 + max(poisson, 0.0))
+    for _ in range(SECTIONS):  # of the least energy by golden sections
+        first, second = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+        left = swollen_energy(first, RATIOS, poisson) < swollen_energy(second, RATIOS, poisson)
+        low, high = np.where(left, low, first), np.where(left, second, high)
+    return 0.5 * (low + high)
 
 
 def swollen_curvature(ratio: Array, poisson: float) -> Array:

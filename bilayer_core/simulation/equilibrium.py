@@ -27,7 +27,6 @@ from bilayer_core.model.model import Model
 from bilayer_core.model.records.status import CROSSED, MAX_ITERATIONS
 from bilayer_core.model.state import NOT_KNOWN, State
 from bilayer_core.simulation.crossing_remedy import crossed, edge_of_strand
-from bilayer_core.simulation.growing_modes import growing_modes
 from bilayer_core.simulation.stepper import Stepper
 
 FIRST, GROWTH, SHRINKAGE, SHORTEST = 1e-2, 10.0, 0.25, 1e-7
@@ -232,6 +231,8 @@ class _Search:
             in_plane, unstable = unstable, self._unstable(space)
             out_of_plane = unstable - in_plane
         if follows(space.model) and not (_rods_touch(space.engine) or _carries_flow(space.model)):
+            from bilayer_core.simulation.growing_modes import growing_modes  # brings scipy's sparse solvers
+
             load_factor = self.stepper.surroundings.load_factor(self.state)
             grows = growing_modes(space.model, self.state, load_factor)
             unstable, rate, frequency = grows.count, grows.rate, grows.frequency

@@ -143,6 +143,7 @@ COMMANDS = {
     "run --log": "run gripping --duration 20ms --quiet --log run.mcap",
     "render": "render run.mcap --png picture.png",
     "converge": "converge cantilever --duration 8ms --quiet",
+    "check": "check gripping",
 }
 
 
