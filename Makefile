@@ -11,13 +11,14 @@ BIN := $(VENV)/bin
 SOURCED_ROS := $(shell test -n "$$AMENT_PREFIX_PATH" && $(PYTHON) -c 'import rclpy' 2>/dev/null && echo yes)
 ifeq ($(SOURCED_ROS),yes)
 ROS := sourced
-EXTRAS := viewer,film,test
+EXTRAS := viewer,film
 VENV_OPTIONS := --system-site-packages
 else
 ROS := wheels
-EXTRAS := ros,viewer,film,test
+EXTRAS := ros,viewer,film
 endif
 STAMP := $(VENV)/installed-with-ros-$(ROS)
+TESTS := $(VENV)/installed-with-tests
 # Tests that together run all pieces of the engine; `make bounds` says which are missing.
 BOUNDS := $(addprefix tests/physics/,test_simulator.py test_bodies.py test_loads.py test_rods_that_meet.py test_solve_static.py test_planar.py test_slip.py test_rod_contact.py test_near_rods.py test_crossing.py test_closed_rods.py test_light.py test_observables.py) \
 	tests/logs/test_joint_markers.py tests/unit/test_widths.py
@@ -28,21 +29,21 @@ help:  ## Show what can be made.
 demo: $(STAMP)  ## Run the gripper: simulation node, controller, log, picture.
 	$(BIN)/python -m bilayer_sim_ros.demo
 
-test: $(STAMP)  ## Run every test, the slow ones as well.
+test: $(TESTS)  ## Run every test, the slow ones as well.
 	command -v chromium >/dev/null || $(BIN)/playwright install --with-deps chromium
 	$(BIN)/python -m pytest -m "" -n $(JOBS) --dist worksteal
 
-lint: $(STAMP)  ## Check the code's style, and the types of what programs call.
+lint: $(TESTS)  ## Check the code's style, and the types of what programs call.
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check --quiet bilayer_core bilayer_sim_ros tests setup.py
 	$(BIN)/mypy
 
-install: $(STAMP) kernels  ## Install into .venv, and compile the kernels.
+install: $(TESTS) kernels  ## Install into .venv, and compile the kernels.
 
-bounds: $(STAMP)  ## Run tests of all kernels with the bounds of arrays checked.
+bounds: $(TESTS)  ## Run tests of all kernels with the bounds of arrays checked.
 	NUMBA_BOUNDSCHECK=1 $(BIN)/python -m pytest -n $(JOBS) $(BOUNDS)
 
-stress: $(STAMP)  ## Run a hundred stress cases, about three minutes.
+stress: $(TESTS)  ## Run a hundred stress cases, about three minutes.
 	$(BIN)/bilayer stress --quick --no-shrink --out runs/stress_quick
 
 # What is found is committed: docs/stability.md with its figures, and the notes in docs/data that it shows.
@@ -72,7 +73,13 @@ $(STAMP): setup.py pyproject.toml package.xml | system
 	@test -z "$$(ls $(VENV)/installed-with-ros-* 2>/dev/null | grep -vx '$(STAMP)')" || rm -rf $(VENV)
 	$(PYTHON) -m venv $(VENV_OPTIONS) $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --editable '.[$(EXTRAS)]'
+	$(BIN)/python -m pip install --editable .
+	$(BIN)/bilayer run gripping --duration '1 ms' --log $(VENV)/first.mcap --force --quiet & \
+	    $(BIN)/python -m pip install --editable '.[$(EXTRAS)]' && wait
+	@touch $@
+
+$(TESTS): $(STAMP)
+	$(BIN)/python -m pip install --editable '.[test]'
 	@touch $@
 
 kernels: $(STAMP)  ## Compile the kernels, once for each state of the sources.

@@ -6,10 +6,16 @@ from bilayer_core.engine.integrate import integrate
 from bilayer_core.engine.light_over_step import begin_light, end_light
 from bilayer_core.engine.linear.contact_columns import take_rod_contacts
 from bilayer_core.engine.linear.widths import SETS
+from bilayer_core.engine.observables import observe
 from bilayer_core.engine.step import treat_state, write_rest_strains
 from bilayer_core.forces.force_register import TERMS
 from bilayer_core.forces.rod_contact import bound_between_rods, find_rod_contacts
+from bilayer_core.kinematics.marker_lines import place_arrows, place_bars
+from bilayer_core.kinematics.node_frames import frames_at_nodes
 from bilayer_core.model.model import Model
+
+FOR_FRAMES = frozenset(of.name for of in (observe, frames_at_nodes, place_bars, place_arrows))
+"""Names of the pieces that write what a node publishes and a log holds."""
 
 
 def needed_pieces(model: Model) -> frozenset[str]:

@@ -10,6 +10,7 @@ from functools import partial
 
 from rclpy.node import Node
 
+from bilayer_core.engine.needed_pieces import FOR_FRAMES, needed_pieces
 from bilayer_core.errors import BilayerError
 from bilayer_core.jit.compile_all import ensure_compiled
 from bilayer_sim_ros.node.parameters import Value
@@ -158,7 +159,8 @@ class SimulationRun:
             while not COMPILING.acquire(timeout=PERIOD):
                 self._report(0, 0)
             try:
-                ensure_compiled(self._report)
+                model = self._simulation.simulator.model
+                ensure_compiled(self._report, lambda: needed_pieces(model) | FOR_FRAMES)
                 self._report(0, 0)
                 seconds = self._simulation.simulator.compile()
             finally:

@@ -52,7 +52,7 @@ def test_what_is_sent_and_asked_for_while_it_compiles_acts_when_it_is_ready(node
     compiled, told = threading.Event(), threading.Event()
     said = []
 
-    def compile_slowly(report):
+    def compile_slowly(report, needed):
         while not compiled.wait(0.1):
             report(3, 60)
 
@@ -89,7 +89,7 @@ def test_what_is_sent_and_asked_for_while_it_compiles_acts_when_it_is_ready(node
 def test_a_node_that_is_stopped_while_it_compiles_ends_at_once_and_its_log_says_why(nodes, monkeypatch, tmp_path):
     begun, go_on = threading.Event(), threading.Event()
 
-    def compile_for_long(report):
+    def compile_for_long(report, needed):
         begun.set()
         go_on.wait(LIMIT)
         report(1, 60)
