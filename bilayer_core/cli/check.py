@@ -43,6 +43,7 @@ def _report(simulator) -> dict[str, Any]:
     from bilayer_core.model.findings import told
     from bilayer_core.model.impacts import impact_warnings
     from bilayer_core.model.twisted import twist_figures
+    from bilayer_core.model.undamped_friction import unseen_vibrations
     from bilayer_core.model.validity import validity_figures
     from bilayer_core.runs.forecast import forecast
 
@@ -79,6 +80,7 @@ def _report(simulator) -> dict[str, Any]:
         ],
         "log": {"bytes_per_second": round(size.per_second), "bytes": round(size.total)},
         "within_validity": list(told(figure for figure in figures if not figure.outside)),
+        "unseen": list(unseen_vibrations(scene)),
         "warnings": [*plan.warnings, *told(impact_warnings(model)), *simulator.start_warnings],
     }
 
@@ -192,6 +194,8 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
         yield from _block("start", [SETTLES])
     if report["tolerance"] is not None:
         yield from _block("accuracy", [ERROR_OF_A_RUN])
+    if report["unseen"]:
+        yield from _block("not seen", report["unseen"])
     yield from _forces(report["terms"])
     yield "contact pairs"
     for pair in report["contact_pairs"] or ["none"]:

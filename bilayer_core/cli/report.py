@@ -64,6 +64,8 @@ def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
         yield from _motions(name, part)
     for warning in summary["warnings"]:
         yield f"  {'WARNING':22}{warning}"
+    for text in summary["unseen"] if "global_error" not in summary else ():  # whose table tells it
+        yield f"  {'not seen':22}{text}"
 
 
 def _motions(name: str, part: dict) -> Iterator[str]:

@@ -10,6 +10,7 @@ import numpy as np
 from bilayer_core.engine.energy_account import LARGEST, NUMERICAL
 from bilayer_core.model.impacts import heaviest, stiffness_that_holds
 from bilayer_core.model.model import Model
+from bilayer_core.model.undamped_friction import unseen_vibrations
 from bilayer_core.model.validity import LARGE_STRAIN, THICK_CURVATURE
 from bilayer_core.observed.system import versions
 from bilayer_core.simulation.plane_watch import PlaneWatch
@@ -34,7 +35,8 @@ def summarise(simulator: Any) -> dict:
     gravity from its value at the start, ``energy_through`` the energy that went through: that or, if it is more, what
     was supplied or lost in all steps. ``numerical_energy`` is what steps have made or, below zero, lost beyond all
     forces (`engine.energy_account`). ``warnings`` tell where the run left the range in which the model is meant to
-    be used, or where the robot would have left the plane of a model of dimension 2.
+    be used, or where the robot would have left the plane of a model of dimension 2. ``unseen`` tells which errors no
+    figure of the run shows.
     """
     model, statistics, plan = simulator.model, simulator.statistics, simulator.plan
     positions = simulator.positions
@@ -106,6 +108,7 @@ def summarise(simulator: Any) -> dict:
             *_warnings(statistics, numerical, through, simulator.plane_watch),
             *_of_contact(model, statistics.unresolved, largest),
         ],
+        "unseen": list(unseen_vibrations(simulator.scene)) if statistics.max_contact_force > 0.0 else [],
         "versions": versions(),
     }
 

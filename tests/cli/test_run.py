@@ -39,6 +39,18 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
+def test_check_and_run_say_that_friction_shakes_an_undamped_material(capsys, here):
+    run = ["run", "crawling_inchworm", "--duration", "20 ms", "--summary", "run.json", "--force"]
+    for change, told in ((), True), (("--set", "materials.film.retardation_time=1ms"), False):
+        assert main(["check", "crawling_inchworm", *change]) == 0
+        assert ("  not seen      vibrations that friction excites" in capsys.readouterr().out) is told
+        assert main([*run, *change]) == 0
+        shown = capsys.readouterr().out
+        assert ("  not seen              vibrations that friction excites" in shown) is told
+        assert ("materials.film.retardation_time damps them" in shown) is told
+        assert bool(json.loads((here / "run.json").read_text())["unseen"]) is told
+
+
 def test_a_run_leaves_log_and_summary_and_tells_what_happened(here, capsys):
     outputs = ["--log", "run.mcap", "--log-rate", "100", "--summary", "run.json"]
     assert main(["run", "cantilever", "--duration", "50 ms", *outputs]) == 0

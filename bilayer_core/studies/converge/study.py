@@ -16,6 +16,7 @@ import numpy as np
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.integrators.integrator_register import INTEGRATORS
 from bilayer_core.model.plan import make_plan
+from bilayer_core.model.undamped_friction import unseen_vibrations
 from bilayer_core.processes import side_by_side
 from bilayer_core.scene.config import LARGEST_TOLERANCE, SceneConfig
 from bilayer_core.scene.loader import load_scene, parse_scene, scene_text
@@ -78,23 +79,6 @@ class Study:
     rows: list[Row]
     missing: dict[str, str]
     unseen: tuple[str, ...] = ()
-
-
-def unseen_errors(scene: SceneConfig) -> tuple[str, ...]:
-    """Return what runs of about the same step may all miss, each with a remedy."""
-    undamped = [name for name, material in scene.materials.items() if material.retardation_time == 0.0 and _rubs(scene)]
-    if not undamped:
-        return ()
-    keys = ", ".join(f"materials.{name}.retardation_time" for name in undamped)
-    return (
-        "vibrations that all these steps leave out: friction excites them where no material damps them, and steps that "
-        f"resolve them may change strides by 10 % or more. --quarter-step adds a third level; {keys} damps them",
-    )
-
-
-def _rubs(scene: SceneConfig) -> bool:
-    law = scene.contact.friction if scene.contact is not None else None
-    return law is not None and law.acts
 
 
 def runs_over_steps(scene: SceneConfig, quarter: bool = False) -> list[Run]:
@@ -237,7 +221,7 @@ def _study(
     steps = simulator.steps
     resolution = steps.longest if steps.adaptive else steps.dt
     rows = [_row(name, found, by_name, resolution if is_event(name) else 0.0) for name in names]
-    return Study(simulator.plan.integrator, str(simulator.steps), rows, missing, unseen_errors(scene))
+    return Study(simulator.plan.integrator, str(simulator.steps), rows, missing, unseen_vibrations(scene))
 
 
 def _make(
