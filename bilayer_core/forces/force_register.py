@@ -18,6 +18,7 @@ from bilayer_core.forces.body_drag import add_body_drag, body_flow_of
 from bilayer_core.forces.bond import add_bonds
 from bilayer_core.forces.drag import add_drag, update_directions_of_drag
 from bilayer_core.forces.elements import start_elements
+from bilayer_core.forces.gyroscopic import add_gyroscopic_force, spinning_of, update_gyroscopic_force
 from bilayer_core.forces.inertia import add_inertial_forces
 from bilayer_core.forces.joints import add_joints, joints_of
 from bilayer_core.forces.loads import add_moments, add_point_forces, start_dead_loads, update_followers, update_moments
@@ -121,6 +122,12 @@ TERMS: tuple[Term, ...] = (
     Term(("followers",), lambda model, of: of["followers"], add_point_forces, update_lagged=update_followers),
     Term(("moments",), lambda model, of: of["moments"], add_moments, update_lagged=update_moments),
     Term(("drag",), lambda model, of: of["flow"], add_drag, update_lagged=update_directions_of_drag),
+    Term(
+        ("gyroscopic",),
+        lambda model, of: spinning_of(model),
+        add_gyroscopic_force,
+        update_lagged=update_gyroscopic_force,
+    ),
     Term(("added mass",), lambda model, of: of["fluid"], add_added_mass, update_lagged=update_fluid),
     Term(
         ("friction",),

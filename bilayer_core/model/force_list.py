@@ -220,6 +220,12 @@ FORCES: tuple[Force, ...] = (
     Force("friction", DISSIPATIVE, "surface_friction.py", _friction, on_nodes=True),
     Force("rod barrier", CONSERVATIVE, "rod_contact.py", _rod_barrier, on_nodes=True),
     Force("rod friction", DISSIPATIVE, "rod_contact.py", _rod_friction, on_nodes=True),
+    Force(
+        "gyroscopic",
+        INERTIAL,
+        "gyroscopic.py",
+        lambda q: _unless(q.dimension == 3, "nothing turns about its axis in a plane"),
+    ),
 )
 """In the order in which their energies are added."""
 

@@ -130,7 +130,7 @@ def test_check_says_what_is_set(capsys):
         "  model         two_rod (set by `solver.model`)\n",
         "  stepping      fixed, 1 ms (set by `solver.dt`)\n",
         "  time          2 s in 2000 steps of 1 ms\n",
-        "  active        stretching, bending, twisting, bond, eigenstrain, inertia, damping\n",
+        "  active        stretching, bending, twisting, bond, eigenstrain, inertia, damping, gyroscopic\n",
     ):
         assert line in text
 

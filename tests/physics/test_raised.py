@@ -105,11 +105,12 @@ def test_a_free_strip_of_unlike_layers_keeps_its_momentum(integrator, dimension)
     assert np.abs(simulator.momentum - momentum).max() < 1e-13 * np.abs(momentum).max() + 1e-15
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("integrator, order", [("implicit_euler", 1), ("implicit_midpoint", 1), ("tr_bdf2", 2)])
-def test_in_a_plane_it_keeps_its_angular_momentum_to_an_order(integrator, order):
+def test_it_keeps_its_angular_momentum_to_an_order(integrator, order, dimension):
     lost = []
     for dt in (1e-3, 5e-4):
-        simulator, (_, before) = thrown(integrator, dt, dimension=2)
+        simulator, (_, before) = thrown(integrator, dt, dimension)
         lost.append(np.linalg.norm(simulator.angular_momentum - before) / np.linalg.norm(before))
     assert np.log2(lost[0] / lost[1]) > order - 0.2
     assert lost[1] < 0.05

@@ -67,6 +67,27 @@ def order_of_spin(integrator: str) -> tuple[float, float]:
     return math.log2(coarse / fine), float(INTEGRATORS[integrator].order)
 
 
+@cache
+def precession() -> tuple[float, float]:
+    """Angle [rad] by which the axis of a stiff rod goes round its angular momentum L, of which its spin is a part.
+
+    A rigid top with the moments of inertia J about its axis and I across it: |L|/I, L = J ω t + I ω₁. A rod resists
+    turns across itself by the masses of its nodes, I = m (L² + 2 l²)/12 with edges of length l.
+    """
+    length, width, edges, spin, across, time = 0.05, 4e-3, 20, 500.0, 10.0, 0.1
+    stick = rod([layer(thickness=width)], length, edges + 1, start=(-0.5 * length, 0, 0), width=width)
+    solver = {"model": "laminate", "dimension": 3, "integrator": "sdirk2", "dt": 5e-4}
+    simulator = Simulator(load_scene(scene([stick], solver, angular_velocity=[spin, across, 0.0])))
+    simulator.run(time)
+    lean = 2.0 * width**2 / (length**2 * (1.0 + 2.0 / edges**2)) * spin  # J ω/I
+    rate = math.hypot(lean, across)
+    axis, start = np.array([lean, across, 0.0]) / rate, np.array([1.0, 0.0, 0.0])
+    along = simulator.positions[-1] - simulator.positions[0]
+    aside = np.cross(axis, start)
+    turned = math.atan2(along @ aside, along @ np.cross(aside, axis))
+    return turned, rate * time
+
+
 STEPS = (1e-3, 5e-4, 2.5e-4)
 
 
@@ -198,6 +219,7 @@ CASES = [
         lambda: (_spin_lost("implicit_midpoint", 2e-4), 0.0),
         scale=1.0,
     ),
+    Case("motion/precession", "torque-free motion of a rigid top", 1e-3, precession, "rad"),
     *(
         Case(
             f"motion/order in time/{name}",

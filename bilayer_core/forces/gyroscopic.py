@@ -1,0 +1,88 @@
+"""Gyroscopic force of edges that turn about their tangents.
+
+An edge with the moment of inertia J about its tangent t and the spin ω has the angular momentum J ω t. While its
+tangent turns at the rate ṫ, that needs the moment J ω ṫ, which the ends of the edge supply. With the edge vector e of
+length l, the inertia of the edge pushes it by
+
+    F = J ω (t × ṫ)/l = J ω (t × ė)/l²,    e × F = −J ω ṫ,    F·ė = 0:
+
+it does no work. Without it, a free strip that spins about its axis while that turns does not keep its angular
+momentum: ω is the rate of the edge's angle against a frame that parallel transport carries in time, and the potential
+of `forces.inertia` knows nothing of how t turns.
+
+Over a stage of length h, ω = (θ − θ̄)/h and ė = (e − ē)/h. F is no gradient. It is held at the configuration to which
+Newton's method moved last, as −F·(e − ē), so the step ends with the force at its end. What that leaves out of the
+Hessian is antisymmetric, and small beside the inertia of nodes: ω h (w/l)²/6 of it at the width w, less where the strip
+resists bending within h.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bilayer_core.jit import kernel, piece, record
+from bilayer_core.jit.record import Matrix
+from bilayer_core.kinematics.vector import combine, cross, dot, row
+from bilayer_core.model.force_slots import slot_of
+from bilayer_core.model.model import Model
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.step import Configuration, Stage
+
+GYROSCOPIC = slot_of("gyroscopic")
+UNSEEN = 2.0**-52
+"""Part of its length, the last digit, by which an edge may be moved in a stage without another look at it."""
+
+
+@record
+class Spinning:
+    """Forces of edges that spin."""
+
+    force: Matrix  # F [N], shape (n_edge, 3)
+
+
+@kernel
+def _lengthening(strands, at, stage, k):
+    """Return by how much an edge vector differs from that at the origin of a stage [m], as a tuple."""
+    i, x, origin = strands.edge_node[k], at.position, stage.origin_position
+    after = combine(1.0, row(x, i + 1), -1.0, row(origin, i + 1))
+    return combine(1.0, after, -1.0, combine(1.0, row(x, i), -1.0, row(origin, i)))
+
+
+@piece(float, Spinning, Problem, Configuration, Stage, bool)
+def add_gyroscopic_force(spinning, p, at, stage, with_hessian):
+    """Add −F·(e − ē) of edges and its derivatives by their vectors."""
+    sums, force, energy = p.sums, spinning.force, 0.0
+    if not sums.selected[GYROSCOPIC]:
+        return math.inf
+    for k in range(force.shape[0]):
+        energy -= dot(row(force, k), _lengthening(p.strands, at, stage, k))
+        for c in range(3):
+            sums.edge[k, c] -= force[k, c]
+    sums.energy[GYROSCOPIC] = energy
+    return math.inf
+
+
+@piece(bool, Spinning, Problem, Configuration, Stage)
+def update_gyroscopic_force(spinning, p, at, stage):
+    """Take F from a configuration; whether it differs by what moves an edge noticeably."""
+    strands, force, h, changed = p.strands, spinning.force, stage.lengths[0], False
+    for k in range(force.shape[0]):
+        length, inertia = at.length[k], strands.spin_inertia[k]
+        factor = inertia * (at.total_angle[k] - stage.origin_angle[k]) / (h * h * length * length)
+        if stage.still[0] == 1.0:
+            factor = 0.0
+        turning = cross(row(at.tangent, k), _lengthening(strands, at, stage, k))
+        change = 0.0
+        for c in range(3):
+            change += abs(factor * turning[c] - force[k, c])
+            force[k, c] = factor * turning[c]
+        # the mass of an edge is about 3 J over the square of half its width
+        changed |= change * h * stage.lengths[1] * strands.half_width[k] ** 2 > 3.0 * UNSEEN * length * inertia
+    return changed
+
+
+def spinning_of(model: Model) -> Spinning:
+    """Return the edges of a model that may spin."""
+    return Spinning(force=np.zeros((model.rods.edge_count, 3)))
