@@ -7,15 +7,16 @@ So from a moment t of the step on
     V = |δX_A − δX_B| + |φ_A| |a|
 
 for a contact point of body A at the arm a, a surface of body B and ρ between them; C is zero where nothing turns. A
-contact point of a rod at an arm A from its node (`model.rod_points`) turns with edges e, whose ends move along straight
-lines, or on arcs of bodies that hold them. Its tangent t = e/|e| is reached from t₀ by the shortest arc: its frame
-turns by
+contact point of a rod at Σ c_e e + Σ s_e A_e from its node (`contact.near`) moves and turns with edges e, whose ends
+move along straight lines, or on arcs of bodies that hold them. The tangent t = e/|e| is reached from t₀ by the shortest
+arc: the frame turns by
 
     ω = t × ṫ + (θ̇ − (t₀ × t)·ṫ/(1 + t₀·t)) t,   ω × A = ω·t (t × A) − (ṫ·A) t
 
 the last part only where t leaves a great circle, for an edge with an end that is held. While an edge keeps half its
-length l, |ṫ| ≤ 2 |ė|/l, and t is at most a sixth of a half turn from t₀. So ω ≤ W = 2.6 |ė|/l + |δθ|, and in V and C
-|φ_A| |a| is W |A|, |φ_A|² |a| is (4 W² + 3 |ë|/l) |A| and what its node has itself.
+length l, |ṫ| ≤ 2 |ė|/l, and t is at most a sixth of a half turn from t₀. So ω ≤ W = 2.6 |ė|/l + |δθ|, and with
+|A| the sum of |s_e A_e|, in V and C |φ_A| |a| is W |A| + Σ |c_e| |ė|, |φ_A|² |a| is (4 W² + 3 |ë|/l) |A| + Σ |c_e| |ë|
+and what its node has itself.
 
 Advancing to the τ at which the right side falls to the kept gap, again and again, approaches the first moment at which
 d does from below: without turning this is Newton's method on a convex function, exact for a plane at once. A contact
@@ -26,7 +27,7 @@ from __future__ import annotations
 
 import math
 
-from bilayer_core.contact.near import gap_normal
+from bilayer_core.contact.near import gap_normal, place_of
 from bilayer_core.contact.shapes import SPHERE
 from bilayer_core.jit import kernel
 from bilayer_core.jit.stack import stack_vector
@@ -117,7 +118,7 @@ def _motion_of_rod_points(surfaces, strands, system, at):
     for i in range(surfaces.node_free.shape[0]):
         speed = max(speed, _speed_of_node(surfaces, system, at, i))
     turn = (0.5 * math.pi if steepest <= 1.0 else math.pi) * steepest + sharpest
-    return speed + surfaces.rod_points.longest * turn
+    return surfaces.rod_points.node_factor * speed + surfaces.rod_points.longest * turn
 
 
 @kernel
@@ -174,18 +175,18 @@ def _node_at(surfaces, system, at, i, t):
 @kernel
 def _rod_point_at(surfaces, strands, system, at, k, t, moved_out, rate_out):
     """Write the displacement of a contact point with an arm at a part t of a step, and its rate."""
-    points, angle_step = surfaces.rod_points, system.angle_step
-    moved = _node_at(surfaces, system, at, points.node[k], t)
+    mix, node, angle_step = surfaces.near_mix, surfaces.near_node[k], system.angle_step
+    moved = _node_at(surfaces, system, at, node, t)
     for c in range(3):
         moved_out[c], rate_out[c] = moved[c], moved[3 + c]
     for side in range(2):
-        e = surfaces.node_edges[points.node[k], side]
+        e, along_edge, part = surfaces.node_edges[node, side], mix[k, side], mix[k, 2 + side]
         n, length, tangent = strands.edge_node[e], at.length[e], row(at.tangent, e)
         first, last = _node_at(surfaces, system, at, n, t), _node_at(surfaces, system, at, n + 1, t)
         m, w = row(at.director1, e), row(at.director2, e)
-        a0 = points.arm[k, 0] * m[0] + points.arm[k, 1] * w[0]
-        a1 = points.arm[k, 0] * m[1] + points.arm[k, 1] * w[1]
-        a2 = points.arm[k, 0] * m[2] + points.arm[k, 1] * w[2]
+        a0 = mix[k, 4] * m[0] + mix[k, 5] * w[0]
+        a1 = mix[k, 4] * m[1] + mix[k, 5] * w[1]
+        a2 = mix[k, 4] * m[2] + mix[k, 5] * w[2]
         u0 = tangent[0] + (last[0] - first[0]) / length
         u1 = tangent[1] + (last[1] - first[1]) / length
         u2 = tangent[2] + (last[2] - first[2]) / length
@@ -198,11 +199,12 @@ def _rod_point_at(surfaces, strands, system, at, k, t, moved_out, rate_out):
         spin += v2 * (tangent[0] * u1 - tangent[1] * u0)
         spin /= (1.0 + tangent[0] * u0 + tangent[1] * u1 + tangent[2] * u2) * length * stretch
         spin = angle_step[e] - spin
-        moved_out[0], moved_out[1] = moved_out[0] + 0.5 * (b0 - a0), moved_out[1] + 0.5 * (b1 - a1)
-        moved_out[2] += 0.5 * (b2 - a2)
-        rate_out[0] += 0.5 * (spin * (u1 * b2 - u2 * b1) - along * u0)
-        rate_out[1] += 0.5 * (spin * (u2 * b0 - u0 * b2) - along * u1)
-        rate_out[2] += 0.5 * (spin * (u0 * b1 - u1 * b0) - along * u2)
+        moved_out[0] += along_edge * (last[0] - first[0]) + part * (b0 - a0)
+        moved_out[1] += along_edge * (last[1] - first[1]) + part * (b1 - a1)
+        moved_out[2] += along_edge * (last[2] - first[2]) + part * (b2 - a2)
+        rate_out[0] += along_edge * v0 + part * (spin * (u1 * b2 - u2 * b1) - along * u0)
+        rate_out[1] += along_edge * v1 + part * (spin * (u2 * b0 - u0 * b2) - along * u1)
+        rate_out[2] += along_edge * v2 + part * (spin * (u0 * b1 - u1 * b0) - along * u2)
 
 
 @kernel
@@ -230,27 +232,31 @@ def step_bound(surfaces, strands, system, at, closing):
     moved, rate_of_point = stack_vector(3), stack_vector(3)
     for k in range(surfaces.near_count[0]):
         i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
-        x0, x1, x2 = at.contact_point[i, 0], at.contact_point[i, 1], at.contact_point[i, 2]
-        gap, n0, n1, n2, _, _, _ = gap_normal(surfaces, at, i, s, x0, x1, x2)
+        x0, x1, x2 = place_of(surfaces, at, k)
+        gap, n0, n1, n2, _, _, _ = gap_normal(surfaces, at, surfaces.near_radius[k], s, x0, x1, x2)
         kept = KEPT_FRACTION * gap
         if gap - closing * alpha >= kept:
             continue
-        a, b = surfaces.moved_by[i], surfaces.body[s]
+        off_node = surfaces.near_arm[k]
+        a, b = -1 if off_node else surfaces.moved_by[i], surfaces.body[s]
         r0 = r1 = r2 = turn_a = 0.0  # rotation of the contact point's body
         a0 = a1 = a2 = arm = slope = change = of_node = own = 0.0  # arm on it
-        slot = i - surfaces.rod_points.first if surfaces.rod_points.exists else -1
         if a >= 0:
             u0, u1, u2 = motion[a, 0], motion[a, 1], motion[a, 2]
             r0, r1, r2 = motion[a, 3], motion[a, 4], motion[a, 5]
             a0, a1, a2 = x0 - position[a, 0], x1 - position[a, 1], x2 - position[a, 2]
             arm, turn_a = math.sqrt(a0 * a0 + a1 * a1 + a2 * a2), math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
-        elif slot < 0:
+        elif not off_node:
             u0, u1, u2 = node_step[i, 0], node_step[i, 1], node_step[i, 2]
         else:
-            n, along, u0, u1, u2 = surfaces.rod_points.node[slot], surfaces.rod_points.arm, 0.0, 0.0, 0.0
+            n, mix, u0, u1, u2 = surfaces.near_node[k], surfaces.near_mix, 0.0, 0.0, 0.0
             of_node, own = _speed_of_node(surfaces, system, at, n), _acceleration_of_node(surfaces, system, at, n)
             slope, angle, change = _turn_at_node(surfaces, strands, system, at, n)
-            turn_a, arm = 2.6 * slope + angle, math.sqrt(along[slot, 0] ** 2 + along[slot, 1] ** 2)
+            turn_a, arm = 2.6 * slope + angle, math.sqrt(mix[k, 4] ** 2 + mix[k, 5] ** 2)
+            arm *= abs(mix[k, 2]) + abs(mix[k, 3])
+            along = abs(mix[k, 0]) * at.length[surfaces.node_edges[n, 0]]
+            along += abs(mix[k, 1]) * at.length[surfaces.node_edges[n, 1]]
+            of_node, own = of_node + along * slope, own + along * change
         u0, u1, u2 = u0 - motion[b, 0], u1 - motion[b, 1], u2 - motion[b, 2]
         f0, f1, f2 = motion[b, 3], motion[b, 4], motion[b, 5]
         if surfaces.kind[s] == SPHERE:
@@ -264,7 +270,7 @@ def step_bound(surfaces, strands, system, at, closing):
         speed = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2) + of_node + turn_a * arm
         if gap - (speed + turn_b * (lever + speed)) * alpha >= kept:
             continue
-        own += (4.0 * turn_a * turn_a + 3.0 * change if slot >= 0 else turn_a * turn_a) * arm
+        own += (4.0 * turn_a * turn_a + 3.0 * change if off_node else turn_a * turn_a) * arm
         acceleration = own + 2.0 * turn_b * speed + turn_b * turn_b * (lever + speed)
         # the contact point in a frame that moves and turns with the surface from where that is now
         t = 0.0
@@ -275,8 +281,8 @@ def step_bound(surfaces, strands, system, at, closing):
             w0 = u0 + r1 * b2 - r2 * b1
             w1 = u1 + r2 * b0 - r0 * b2
             w2 = u2 + r0 * b1 - r1 * b0
-            if slot >= 0:
-                _rod_point_at(surfaces, strands, system, at, slot, t, moved, rate_of_point)
+            if off_node:
+                _rod_point_at(surfaces, strands, system, at, k, t, moved, rate_of_point)
                 w0, w1, w2 = u0 + rate_of_point[0], u1 + rate_of_point[1], u2 + rate_of_point[2]
             if turn_b > 0.0:
                 w0, w1, w2 = _turned(w0, w1, w2, -t, f0, f1, f2)
@@ -294,8 +300,8 @@ def step_bound(surfaces, strands, system, at, closing):
             if t >= alpha:
                 break
             b0, b1, b2 = _turned(a0, a1, a2, t, r0, r1, r2)
-            if slot >= 0:
-                _rod_point_at(surfaces, strands, system, at, slot, t, moved, rate_of_point)
+            if off_node:
+                _rod_point_at(surfaces, strands, system, at, k, t, moved, rate_of_point)
                 b0, b1, b2 = moved[0], moved[1], moved[2]
             z0 = x0 - a0 + t * u0 + b0 - position[b, 0]
             z1 = x1 - a1 + t * u1 + b1 - position[b, 1]
@@ -303,7 +309,7 @@ def step_bound(surfaces, strands, system, at, closing):
             if turn_b > 0.0:
                 z0, z1, z2 = _turned(z0, z1, z2, -t, f0, f1, f2)
             y0, y1, y2 = z0 + position[b, 0], z1 + position[b, 1], z2 + position[b, 2]
-            d, n0, n1, n2, _, _, _ = gap_normal(surfaces, at, i, s, y0, y1, y2)
+            d, n0, n1, n2, _, _, _ = gap_normal(surfaces, at, surfaces.near_radius[k], s, y0, y1, y2)
             if d <= kept + CLOSE_ENOUGH * gap:
                 break
         if t < alpha:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bilayer_core.forces.rod_arms import place_rod_points
 from bilayer_core.jit import kernel, piece
 from bilayer_core.kinematics.copying import copy, copy_matrix, copy_row
 from bilayer_core.kinematics.frames import edge_geometry, planar_frames, transport_directors
@@ -120,12 +119,9 @@ def update_attached(p, at):
 
 @piece(int, Problem, Configuration, Configuration)
 def transport_frames(p, base, at):
-    """Frames of `base`, carried to the positions of `at` and turned by its angles; in a plane those of positions.
-    Contact points of rods follow them.
-    """
+    """Frames of `base`, carried to the positions of `at` and turned by its angles; in a plane those of positions."""
     _transport_in_space(p.space, p.strands, base, at, at.angle)
     _frames_in_plane(p.plane, p.strands, at)
-    place_rod_points(p.surfaces, at)
     return READY
 
 
@@ -265,5 +261,4 @@ def take_state(p, state, at):
     update_attached(p, at)
     edge_geometry(at.position, strands.edge_node, at.length, at.tangent)
     second_director(at.tangent, at.director1, at.director2)
-    place_rod_points(p.surfaces, at)
     return READY

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from bilayer_core.contact.barrier import barrier_gradient
-from bilayer_core.contact.near import gap_normal
+from bilayer_core.contact.near import gap_normal, place_of
 from bilayer_core.forces.bend_twist import bend_by_strains
-from bilayer_core.forces.rod_arms import add_step_of_arm, has_arm, node_of, write_material_rate
+from bilayer_core.forces.rod_arms import add_step_of_arm, write_material_rate
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.stack import stack_matrix, stack_vector
 from bilayer_core.kinematics.rotating import inertia_tensor, solve_three
@@ -126,27 +126,27 @@ def _power_of_barriers(p, at, point, rates):
     if surfaces.exists:
         scratch = sums.arm_rate.shape[0] - 1
         for k in range(surfaces.near_count[0]):
-            if surfaces.near_gap[k] >= surfaces.d_hat:
+            if surfaces.near_gap[k] >= surfaces.d_hat or surfaces.near_weight[k] == 0.0:
                 continue
             i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
-            x = row(at.contact_point, i)
-            d, n0, n1, n2, _, _, _ = gap_normal(surfaces, at, i, s, x[0], x[1], x[2])
+            x = place_of(surfaces, at, k)
+            d, n0, n1, n2, _, _, _ = gap_normal(surfaces, at, surfaces.near_radius[k], s, x[0], x[1], x[2])
             if not 0.0 < d < surfaces.d_hat:
                 continue
-            body, node = surfaces.contact_point_body[i], node_of(surfaces, i)
+            body, node = surfaces.contact_point_body[i], surfaces.near_node[k]
             velocity[0] = velocity[1] = velocity[2] = 0.0
             if body >= 0:
                 _add_velocity(rates, body, x, at, 1.0, velocity)
             else:
                 for c in range(3):
                     velocity[c] = point.velocity[node, c]
-                if has_arm(surfaces, i):
-                    write_material_rate(surfaces, p.strands, at, i, scratch, sums.arm_rate)
+                if surfaces.near_arm[k]:
+                    write_material_rate(surfaces, at, k, scratch, sums.arm_rate)
                     add_step_of_arm(
                         surfaces, p.strands, node, scratch, sums.arm_rate, point.velocity, point.spin, velocity
                     )
             _add_velocity(rates, surfaces.body[s], x, at, -1.0, velocity)
-            slope = surfaces.stiffness * surfaces.weight[i] * barrier_gradient(d, surfaces.d_hat)
+            slope = surfaces.stiffness * surfaces.near_weight[k] * barrier_gradient(d, surfaces.d_hat)
             power += slope * (velocity[0] * n0 + velocity[1] * n1 + velocity[2] * n2)
     if rods.exists:
         contacts = rods.contacts

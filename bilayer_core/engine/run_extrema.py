@@ -10,7 +10,6 @@ import math
 
 from bilayer_core.engine.powers import LOST, SUPPLIED
 from bilayer_core.forces.bend_twist import bending_strain
-from bilayer_core.forces.rod_arms import node_of
 from bilayer_core.jit import kernel, piece
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
@@ -90,7 +89,7 @@ def _count_contacts(surfaces, time, extrema):
     count, last = extrema.nodes, extrema.last_surface
     count[:], last[:] = 0, -1
     for c in range(surfaces.near_count[0]):
-        i, s = node_of(surfaces, surfaces.near_contact_point[c]), surfaces.near_surface[c]
+        i, s = surfaces.near_node[c], surfaces.near_surface[c]
         if surfaces.near_gap[c] < surfaces.d_hat and i < last.shape[0] and last[i] != s:
             count[s] += 1
             last[i] = s

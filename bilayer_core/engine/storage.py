@@ -220,14 +220,13 @@ def _take_over(old: Sliding | RodContactList, new: Sliding | RodContactList, cou
 def new_configuration(model: Model, sizes: dict[str, int]) -> Configuration:
     """Arrays of a configuration, of which everything that does not move is in place; `sizes` as in `model.sizes`."""
     surfaces = model.surfaces
-    contact_point = np.zeros((sizes["contact_point"], 3))
-    nodes, of_rods = model.node_count, model.node_count + sizes["point"]
+    nodes = model.node_count
+    contact_point = np.zeros((nodes + sizes["point"], 3))
     at = Configuration.zeros(
         sizes,
         contact_point=contact_point,
         position=contact_point[:nodes],
-        point=contact_point[nodes:of_rods],
-        rod_point=contact_point[of_rods:],
+        point=contact_point[nodes:],
     )
     at.length[:], at.rotation[:] = 1.0, np.eye(3)
     if not (surfaces.body < sizes["body"]).any():

@@ -109,7 +109,9 @@ def measure_gaps(p, at, strain_out):
     for k in range(restitution.point.shape[0]):
         i, s = restitution.point[k], restitution.surface[k]
         x = at.contact_point
-        strain_out[restitution.first + k] = gap_normal(p.surfaces, at, i, s, x[i, 0], x[i, 1], x[i, 2])[0]
+        strain_out[restitution.first + k] = gap_normal(
+            p.surfaces, at, p.surfaces.radius[i], s, x[i, 0], x[i, 1], x[i, 2]
+        )[0]
 
 
 @piece(float, Restitution, Problem, Configuration, Stage, bool)
@@ -137,7 +139,7 @@ def end_restitution(restitution, p, at, stage):
     for k in range(restitution.rate.shape[0]):
         i, s = restitution.point[k], restitution.surface[k]
         x, slot = at.contact_point, restitution.memory[0] + k
-        gap = gap_normal(p.surfaces, at, i, s, x[i, 0], x[i, 1], x[i, 2])[0]
+        gap = gap_normal(p.surfaces, at, p.surfaces.radius[i], s, x[i, 0], x[i, 1], x[i, 2])[0]
         closing = max((stage.origin_strain[restitution.first + k] - gap) / stage.lengths[0], 0.0)
         known = abs(p.memory[slot])
         p.memory[slot] = -closing if gap >= p.surfaces.d_hat else max(known, closing)

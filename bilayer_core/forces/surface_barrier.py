@@ -23,11 +23,11 @@ from __future__ import annotations
 import math
 
 from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hessian
-from bilayer_core.contact.near import gap_normal
+from bilayer_core.contact.near import gap_normal, place_of
 from bilayer_core.contact.shapes import shape_curvature
 from bilayer_core.forces.contact_on_bodies import add_force, add_second_derivative
 from bilayer_core.forces.restitution import RESTITUTION, damping_at
-from bilayer_core.forces.rod_arms import add_to_edges, has_arm, new_arm, node_of, write_curvature, write_material_rate
+from bilayer_core.forces.rod_arms import add_to_edges, new_arm, write_curvature, write_material_rate
 from bilayer_core.forces.surface_pairs import list_surface_pairs
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.stack import stack_matrix, stack_vector
@@ -68,8 +68,8 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
     arm[0] = arm[1] = arm[2] = 0.0
     for k in range(surfaces.near_count[0]):
         i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
-        x0, x1, x2 = at.contact_point[i, 0], at.contact_point[i, 1], at.contact_point[i, 2]
-        d, n[0], n[1], n[2], p0, p1, p2 = gap_normal(surfaces, at, i, s, x0, x1, x2)
+        x = place_of(surfaces, at, k)
+        d, n[0], n[1], n[2], p0, p1, p2 = gap_normal(surfaces, at, surfaces.near_radius[k], s, x[0], x[1], x[2])
         surfaces.near_gap[k] = d
         min_gap = min(min_gap, d)
         if d >= d_hat:
@@ -77,8 +77,10 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
         if d <= 0.0:
             energy = math.inf
             break
+        if surfaces.near_weight[k] == 0.0:
+            continue
         a, b = surfaces.contact_point_body[i], surfaces.body[s]
-        stiffness = surfaces.stiffness * surfaces.weight[i]
+        stiffness = surfaces.stiffness * surfaces.near_weight[k]
         energy += elastic * stiffness * barrier(d, d_hat)
         slope = stiffness * barrier_gradient(d, d_hat)
         if damped:
@@ -89,19 +91,19 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
                 lost -= slope * part * (d - origin) / stage.lengths[0]
         curvature = stiffness * barrier_hessian(d, d_hat) * (elastic - part) - beta * slope
         slope *= elastic - part
-        node = node_of(surfaces, i)
+        node = surfaces.near_node[k]
         for c in range(3):
             g[c] = slope * n[c]
-            lever[c] = at.contact_point[i, c] - at.pose_position[b, c]
+            lever[c] = x[c] - at.pose_position[b, c]
             sums.contact_point[node, c] += g[c]
         r = -1
-        if has_arm(surfaces, i):
+        if surfaces.near_arm[k]:
             r = sums.arms[0]
-            write_material_rate(surfaces, p.strands, at, i, r, sums.arm_rate)
-            add_to_edges(surfaces, p.strands, node, g, r, sums.arm_rate, sums.edge)
+            write_material_rate(surfaces, at, k, r, sums.arm_rate)
+            add_to_edges(surfaces, node, g, r, sums.arm_rate, sums.edge)
         if a >= 0:
             for c in range(3):
-                arm[c] = at.contact_point[i, c] - at.pose_position[a, c]
+                arm[c] = x[c] - at.pose_position[a, c]
             add_force(sums.contact, a, 1.0, arm, g)
         add_force(sums.contact, b, -1.0, lever, g)
         if with_hessian:
@@ -112,7 +114,7 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
                     m[c, e] += curvature * n[c] * n[e]
             if r >= 0:
                 r = new_arm(sums, node)
-                write_curvature(surfaces, p.strands, at, i, g, r, sums)
+                write_curvature(surfaces, at, k, g, r, sums)
             add_second_derivative(p, m, g, arm, lever, 1.0, node, r, a, b)
     sums.energy[BARRIER] = energy
     if damped:

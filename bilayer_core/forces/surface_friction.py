@@ -40,7 +40,7 @@ import math
 
 from bilayer_core.contact.barrier import barrier_gradient
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
-from bilayer_core.contact.near import gap_normal
+from bilayer_core.contact.near import gap_normal, mix_of, place_of, rod_point
 from bilayer_core.forces.contact_on_bodies import add_force, add_second_derivative
 from bilayer_core.forces.restitution import damping_at
 from bilayer_core.forces.rod_arms import (
@@ -49,7 +49,6 @@ from bilayer_core.forces.rod_arms import (
     add_to_edges,
     copy_rate,
     new_arm,
-    node_of,
     write_rate,
 )
 from bilayer_core.jit import kernel, piece
@@ -263,7 +262,7 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
         if a >= 0:
             add_force(sums.contact, a, 1.0, arm, g)
         else:
-            add_to_edges(surfaces, p.strands, node, g, k, sliding.arm_rate, sums.edge)
+            add_to_edges(surfaces, node, g, k, sliding.arm_rate, sums.edge)
         add_force(sums.contact, b, -1.0, lever, g)
         if with_hessian:
             excess = 0.0
@@ -284,6 +283,12 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
 
 
 @kernel
+def _on_curve(surfaces, at, i, mix):
+    """Place of a rod's contact point without its arm [m]."""
+    return rod_point(surfaces, at, i, (mix[0], mix[1], 0.0, 0.0, 0.0, 0.0))
+
+
+@kernel
 def _freeze(sliding, p, at, stage):
     """List the contacts at a configuration, with their normal forces, directions and arms; near pairs are those that
     the barrier listed. Returns whether they are the same as before.
@@ -295,24 +300,27 @@ def _freeze(sliding, p, at, stage):
     n, arm, count, same = stack_vector(3), stack_vector(3), 0, True
     for k in range(surfaces.near_count[0]):
         i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
-        x0, x1, x2 = at.contact_point[i, 0], at.contact_point[i, 1], at.contact_point[i, 2]
-        d, n[0], n[1], n[2], _, _, _ = gap_normal(surfaces, at, i, s, x0, x1, x2)
-        if not 0.0 < d < surfaces.d_hat:
+        x, weight, radius = place_of(surfaces, at, k), surfaces.near_weight[k], surfaces.near_radius[k]
+        d, n[0], n[1], n[2], _, _, _ = gap_normal(surfaces, at, radius, s, x[0], x[1], x[2])
+        if not 0.0 < d < surfaces.d_hat or weight == 0.0:
             continue
-        a, b, node = surfaces.contact_point_body[i], surfaces.body[s], node_of(surfaces, i)
+        a, b, node, mix = surfaces.contact_point_body[i], surfaces.body[s], surfaces.near_node[k], mix_of(surfaces, k)
         same &= count < sliding.count[0] and sliding.first[count] == i and sliding.surface[count] == s
+        same &= sliding.part[count, 0] == mix[1] and sliding.part[count, 1] == mix[5]
         sliding.first[count], sliding.surface[count], sliding.node[count] = i, s, node
+        sliding.part[count, 0], sliding.part[count, 1] = mix[1], mix[5]
         sliding.last_load[count] = sliding.load[count]
-        sliding.load[count] = -surfaces.stiffness * surfaces.weight[i] * barrier_gradient(d, surfaces.d_hat)
+        sliding.load[count] = -surfaces.stiffness * weight * barrier_gradient(d, surfaces.d_hat)
         if p.restitution.exists:
             sliding.load[count] *= 1.0 - damping_at(p, stage, i, s, d)[0]
+        from_point = row(at.pose_position, a) if a >= 0 else _on_curve(surfaces, at, node, mix)
         for c in range(3):
-            touched = at.contact_point[i, c] - surfaces.radius[i] * n[c]
-            arm[c] = touched - (at.pose_position[a, c] if a >= 0 else at.position[node, c])
+            touched = x[c] - radius * n[c]
+            arm[c] = touched - from_point[c]
             sliding.normal[count, c], sliding.arm[count, c] = n[c], arm[c]
             sliding.lever[count, c] = touched - at.pose_position[b, c]
         if a < 0:
-            write_rate(surfaces, p.strands, at, node, arm, count, sliding.arm_rate)
+            write_rate(surfaces, at, node, mix, arm, count, sliding.arm_rate)
         _write_axis(sliding, surfaces, at, count, i, s, node, n)
         count += 1
     same &= count == sliding.count[0]

@@ -27,6 +27,8 @@ def list_surface_pairs(surfaces, at, motion):
     if moved_since(surfaces, at) + motion <= surfaces.margin[0]:
         return READY
     margin = max(surfaces.d_hat, MOTION_MARGIN * motion)
+    if surfaces.dense:
+        margin = min(margin, motion + MOTION_MARGIN * surfaces.d_hat)
     count = list_near(surfaces, at, margin)
     if count > surfaces.near_contact_point.shape[0]:
         surfaces.margin[0] = -1.0

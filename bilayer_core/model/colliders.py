@@ -133,12 +133,14 @@ def _is_ribbon(rod: Rod) -> bool:
 
 def _points_of_rods(scene: SceneConfig, dimension: int, kind: str) -> str:
     """Which points of rods meet a surface, and what a plane leaves out."""
+    along = "nodes" if kind == "plane" else "points along rods"
     if not any(is_ribbon(rod) for rod in scene.rods):
-        return f"nodes against {kind}"
+        return f"{along} against {kind}"
     if dimension == 3:
-        return f"nodes and borders of ribbons against {kind}"
+        return f"{'nodes and borders of' if kind == 'plane' else 'points all over'} ribbons against {kind}"
     if kind == "plane":
         return f"nodes against {kind}; borders of ribbons touch as they do"
     return (
-        f"nodes against {kind}; where it is not the same across, a plane leaves out that borders of ribbons touch later"
+        f"{along} against {kind}; where it is not the same across, a plane leaves out that borders of ribbons touch "
+        "later"
     )

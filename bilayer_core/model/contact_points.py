@@ -10,6 +10,7 @@ import numpy as np
 from bilayer_core.jit import UNALLOCATED
 from bilayer_core.model.colliders import RODS, Collider, colliders, points_can_collide, shapes_can_collide
 from bilayer_core.model.model import Model, PlacedBodies
+from bilayer_core.model.points_between import demand_of, strip_area
 from bilayer_core.model.records import contacts
 from bilayer_core.model.records.contacts import Sliding, Surfaces
 from bilayer_core.model.rod_points import RodPoints, rod_points
@@ -79,7 +80,7 @@ def build_contact(
     own, free = np.array([p.body for p in others], dtype=np.int64), np.full(len(of_rods.node), -1)
     contact, node_edges = scene.contact, found.column("node_edges", np.int64, 2)
     clear = contact.barrier_distance if contact is not None else 0.0
-    of_nodes = _nodes_can_collide(found, of_rods, bodies, of_bodies, surfaces, held_by, clear)
+    of_nodes, of_sections = _nodes_can_collide(found, of_rods, bodies, of_bodies, surfaces, held_by, clear)
     of_others = np.array([p.can_collide for p in others], dtype=bool).reshape(len(others), len(surfaces))
     rows = np.concatenate([of_nodes & (of_rods.node_weight > 0.0)[:, None], of_others, of_nodes[of_rods.node]])
     used = rows.any(axis=0)
@@ -87,8 +88,12 @@ def build_contact(
     groups, group = _distinct(rows[:, used])
 
     point_body, moved_by = np.concatenate([np.full(nodes, -1), own, free]), np.concatenate([held_by, own, free])
-    arms = np.linalg.norm(of_rods.arm, axis=1)
-    has_arms = len(arms) > 0
+    section = of_rods.section
+    demands = [demand_of(surface.shape, strip_area(section)) for surface in surfaces]
+    sharpest, least_spacing = np.array(demands).reshape(-1, 2).T
+    dense = bool((sharpest >= 0.0).any())
+    arms = np.hypot(section[:, 1], section[:, 2]) if dense else np.linalg.norm(of_rods.arm, axis=1)
+    at_edges = node_edges if dense else node_edges[of_rods.node]
     record = Surfaces.zeros(
         UNALLOCATED,
         d_hat=clear,
@@ -104,11 +109,25 @@ def build_contact(
         point_body=own,
         node_edges=node_edges,
         rod_points=(
-            contacts.RodPoints(first=nodes + len(others), node=of_rods.node, arm=of_rods.arm, longest=float(arms.max()))
-            if has_arms
+            contacts.RodPoints(
+                first=nodes + len(others),
+                node=of_rods.node,
+                arm=of_rods.arm,
+                longest=(PARTS_BETWEEN if dense else 1.0) * float(arms.max()),
+                node_factor=NODES_BETWEEN if dense else 1.0,
+            )
+            if len(arms)
             else contacts.RodPoints.absent()
         ),
-        arm_factor=_arm_factor(found, arms, node_edges[of_rods.node]),
+        arm_factor=_arm_factor(found, arms, at_edges, dense),
+        section=section,
+        node_part=_node_part(node_edges),
+        edge_length=found.column("rest_length"),
+        node_can_collide=np.ascontiguousarray(of_nodes[:, used].T),
+        edge_can_collide=_of_edges(found, of_sections[:, used]),
+        dense=dense,
+        sharpest=sharpest.copy(),
+        least_spacing=least_spacing.copy(),
         kind=np.array([NUMBER[s.shape.kind] for s in surfaces], dtype=np.int64),
         size=np.array([s.shape.core for s in surfaces]).reshape(-1, 3),
         rounding=np.array([s.shape.rounding for s in surfaces]),
@@ -117,7 +136,7 @@ def build_contact(
         position=np.array([s.position for s in surfaces]).reshape(-1, 3),
         rotation=np.array([s.rotation @ s.shape.rotation for s in surfaces]).reshape(-1, 3, 3),
         can_collide=np.ascontiguousarray(groups.T),
-        edge_can_cross=_edges_can_cross(found, of_nodes[:, used], surfaces),
+        edge_can_cross=_of_edges(found, of_nodes[:, used]) & (sharpest >= 0.0)[:, None],
         margin=np.zeros(1),
     )
     surface_grain = np.array([s.grain for s in surfaces]).reshape(-1, 3)
@@ -139,15 +158,30 @@ def build_contact(
     )
 
 
-def _arm_factor(found: Collected, arm: np.ndarray, edges: np.ndarray) -> float:
+PARTS_BETWEEN = 2.0
+"""|s_b| + |s_a| of a point between stations at most: beyond the last edge."""
+NODES_BETWEEN = 1.25
+"""Sum of the magnitudes of the parts that three nodes have in it, in the middle of an edge, where that is largest."""
+
+
+def _node_part(edges: np.ndarray) -> np.ndarray:
+    """Return the parts of the edges before and after each node, shape (n_node, 2), in its directions, likewise."""
+    end = edges[:, 0] == edges[:, 1]
+    first = end & (np.append(edges[1:, 0], -1) == edges[:, 1])
+    return np.where(end[:, None], np.stack([~first, first], axis=1), 0.5)
+
+
+def _arm_factor(found: Collected, arm: np.ndarray, edges: np.ndarray, between: bool) -> float:
     """How many times farther than nodes, and borders of edges by a turn, a contact point of a rod moves at most.
 
     Its arm [m], shape (n_rod_point,), turns with the edges next to it, shape (n_rod_point, 2), by at most the motion of
-    one end against the other over their length, of which half is left at least.
+    one end against the other over their length, of which half is left at least. If there are points between stations,
+    the factors of `NODES_BETWEEN` and `PARTS_BETWEEN` come to that.
     """
     slope = arm / found.column("rest_length")[edges].min(axis=1)
     turn = arm / found.column("half_width")[edges].min(axis=1)
-    return float(np.max(1.0 + 4.0 * slope + turn, initial=1.0))
+    of_nodes, parts = (NODES_BETWEEN, PARTS_BETWEEN) if between else (1.0, 1.0)
+    return float(np.max(of_nodes + parts * (4.0 * slope + turn), initial=1.0))
 
 
 BITS = 62
@@ -202,17 +236,18 @@ def _nodes_can_collide(
     surfaces: list[Owned],
     held_by: np.ndarray,
     clear: float,
-) -> np.ndarray:
-    """Which nodes meet which surfaces, shape (n_node, n_surface); their points with arms meet the same.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which nodes meet which surfaces, and which would if no body held them, shape (n_node, n_surface); their points
+    with arms meet the same.
 
     A node that a body holds does not meet the body's own surface, nor do its neighbours along the strand up to the
     first that is clear of the barrier: a rod may grow out of a body.
     """
     nodes = found.node_count
-    rows = np.zeros((nodes, len(surfaces)), dtype=bool)
+    rows, sections = np.zeros((2, nodes, len(surfaces)), dtype=bool)
     position = found.column("position", width=3)
     for column, surface in enumerate(surfaces):
-        rows[:, column] = points_can_collide(RODS, surface.collider)
+        rows[:, column] = sections[:, column] = points_can_collide(RODS, surface.collider)
         for node in np.flatnonzero(held_by >= 0):
             rows[node, column] = points_can_collide(of_bodies[held_by[node]], surface.collider)
         if surface.body == len(bodies.names):
@@ -223,16 +258,15 @@ def _nodes_can_collide(
         np.minimum.at(gap, points.node, of_points)
         for node in np.flatnonzero(held_by == surface.body):
             strand = next(s for s in found.strands if s.first_node <= node < s.first_node + s.node_count)
-            rows[_from_clamp(node, strand, gap, clear), column] = False
-    return rows
+            own = _from_clamp(node, strand, gap, clear)
+            rows[own, column] = sections[own, column] = False
+    return rows, sections
 
 
-def _edges_can_cross(found: Collected, nodes_can_collide: np.ndarray, surfaces: list[Owned]) -> np.ndarray:
-    """Edges of which both nodes meet a surface that is no plane, shape (n_surface, n_edge)."""
+def _of_edges(found: Collected, of_nodes: np.ndarray) -> np.ndarray:
+    """Edges of which both nodes meet a surface, shape (n_surface, n_edge)."""
     first = found.column("edge_node", np.int64)
-    curved = np.array([surface.shape.kind != "plane" for surface in surfaces], dtype=bool)
-    both = nodes_can_collide[first] & nodes_can_collide[first + 1] & curved
-    return np.ascontiguousarray(both.T)
+    return np.ascontiguousarray((of_nodes[first] & of_nodes[first + 1]).T)
 
 
 def _from_clamp(node: int, strand: StrandArrays, gap: np.ndarray, clear: float) -> list[int]:

@@ -40,6 +40,9 @@ class RodPoints:
         [m], shape (n_rod_point,).
     position : Array
         At the start [m], shape (n_rod_point, 3).
+    section : Array
+        Half the thickness, distance of a border from the middle, its height over the node, and Δl of the path, which is
+        0 of copies of other nodes [m], shape (n_node, 4).
     """
 
     node_weight: Array
@@ -49,6 +52,7 @@ class RodPoints:
     weight: Array
     radius: Array
     position: Array
+    section: Array
 
 
 def rod_points(found: Collected, in_plane: bool) -> RodPoints:
@@ -81,6 +85,7 @@ def rod_points(found: Collected, in_plane: bool) -> RodPoints:
         weight[order],
         half[node],
         _at_start(found, node, arm),
+        np.stack([half, border, height, length], axis=1),
     )
 
 

@@ -28,7 +28,6 @@ def sizes_of(model: Model) -> dict[str, int]:
         "attached": len(model.constrained.node),
         "contact_point": len(surfaces.weight),
         "point": len(surfaces.point_position),
-        "rod point": len(surfaces.rod_points.node),
         "surface": len(surfaces.kind),
         "body": bodies,
         "body+world": bodies + 1,

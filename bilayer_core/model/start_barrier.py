@@ -101,11 +101,12 @@ def _on_surfaces(model: Model, parts: _Parts, distance: float) -> Iterator[tuple
     surfaces, names = model.surfaces, contact_point_names(model)
     arms = surfaces.rod_points.node if surfaces.rod_points.exists else np.zeros(0, dtype=np.int64)
     of_point = np.concatenate([parts.of_node, parts.of_body[surfaces.point_body], parts.of_node[arms]])
-    for s, points, gaps in surface_gaps(model, distance):
+    for found in surface_gaps(model, distance):
+        s = found.surface
         of_surface, name = int(parts.of_body[surfaces.body[s]]), surface_name(model, model.surface_names[s])
-        for point, gap in zip(points.tolist(), gaps.tolist(), strict=True):
-            if of_point[point] != of_surface:
-                weight = float(surfaces.weight[point])
+        numbers = found.point.tolist(), found.weight.tolist(), found.gap.tolist()
+        for point, weight, gap in zip(*numbers, strict=True):
+            if of_point[point] != of_surface and weight > 0.0:
                 yield int(of_point[point]), of_surface, weight, gap, f"{names[point]} is near {name}"
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from bilayer_core.errors import PenetrationError
 from bilayer_core.model.contact_points import contact_point_names, start_contact_points
 from bilayer_core.model.model import Model
+from bilayer_core.model.points_between import points_between
 from bilayer_core.model.rod_surfaces import NearPairs
 from bilayer_core.model.shape_numbers import NUMBER, Shape, signed_distance
 
@@ -38,19 +39,37 @@ class RodGaps:
         return first, _place(model, self.edge[pair], self.fraction[pair])
 
 
-def surface_gaps(model: Model, within: float) -> Iterator[tuple[int, Array, Array]]:
-    """Yield each surface with the contact points that it meets and that are nearer than `within` [m], and their gaps
-    [m].
+@dataclass(frozen=True)
+class SurfaceGaps:
+    """Contact points that a surface meets, with their gaps, Δl and places [m]; those between stations count as their
+    nodes.
     """
+
+    surface: int
+    point: Array
+    gap: Array
+    weight: Array
+    place: Array
+
+
+def surface_gaps(model: Model, within: float) -> Iterator[SurfaceGaps]:
+    """Yield of each surface the contact points that it meets and that are nearer than `within` [m]."""
     surfaces, bodies, position = model.surfaces, model.bodies, start_contact_points(model)
     base = np.concatenate([bodies.start_position, np.zeros((1, 3))])[surfaces.body]
     rotation = np.concatenate([bodies.start_rotation, np.eye(3)[None]])[surfaces.body]
+    everything, of_rods = np.arange(len(position)), surfaces.contact_point_body < 0
     for s in range(len(model.surface_names)):
         core = Shape(_KIND[int(surfaces.kind[s])], surfaces.size[s], 0.0, rotation[s] @ surfaces.rotation[s])
         origin = base[s] + rotation[s] @ surfaces.position[s]
-        gap = signed_distance(core, position - origin) - surfaces.rounding[s] - surfaces.radius
-        near = np.flatnonzero((gap < within) & surfaces.can_collide[s][surfaces.group])
-        yield s, near, gap[near]
+        meets = surfaces.can_collide[s][surfaces.group]
+        weight = np.where(of_rods & (surfaces.sharpest[s] >= 0.0), 0.0, surfaces.weight)
+        parts = [(everything[meets], position[meets], surfaces.radius[meets], weight[meets])]
+        for cell in points_between(model, s, origin, within):
+            parts.append((np.full(len(cell.radius), cell.node), cell.place, cell.radius, cell.weight))
+        point, place, radius, weight = (np.concatenate(of_all) for of_all in zip(*parts, strict=True))
+        gap = signed_distance(core, place - origin) - surfaces.rounding[s] - radius
+        near = gap < within
+        yield SurfaceGaps(s, point[near], gap[near], weight[near], place[near])
 
 
 def rod_gaps(model: Model, within: float) -> RodGaps:
@@ -80,18 +99,17 @@ def _place(model: Model, edge: int, fraction: float) -> str:
 
 def refuse_penetration(model: Model) -> None:
     """Raise PenetrationError if a contact point starts behind a surface that it meets, or touching it."""
-    faults = [
-        (gap, point, model.surface_names[s])
-        for s, points, gaps in surface_gaps(model, np.nextafter(0.0, 1.0))
-        for point, gap in zip(points.tolist(), gaps.tolist(), strict=True)
-    ]
-    if faults:
-        depth, contact_point, surface = min(faults)
-        place, surface = start_contact_points(model)[contact_point], surface_name(model, surface)
+    found = [gaps for gaps in surface_gaps(model, np.nextafter(0.0, 1.0)) if len(gaps.gap)]
+    if found:
+        count = sum(len(gaps.gap) for gaps in found)
+        worst = min(found, key=lambda gaps: gaps.gap.min())
+        k = int(worst.gap.argmin())
+        depth, contact_point, place = float(worst.gap[k]), int(worst.point[k]), worst.place[k]
+        surface = surface_name(model, model.surface_names[worst.surface])
         raise PenetrationError(
             f"{model.scene.name}: the scene starts in penetration: {contact_point_names(model)[contact_point]} at "
             f"({', '.join(f'{1e3 * c:.3f}' for c in place)}) mm is {abs(1e3 * depth):.4g} mm behind "
-            f"the surface of {surface}{f', and {len(faults) - 1} more' if len(faults) > 1 else ''}; "
+            f"the surface of {surface}{f', and {count - 1} more' if count > 1 else ''}; "
             "all gaps must be positive at the start"
         )
 

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bilayer_core.model.plate_strip import curved_stiffness, folds, swollen_curvature
+from bilayer_core.model.points_between import demand_of, spacing
 from bilayer_core.model.section import outline
+from bilayer_core.model.shape_numbers import shape_of
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.profile import values_at
@@ -20,7 +22,7 @@ THICK_CURVATURE = 0.2  # curvature × thickness
 PLATE = 0.05  # of curvature or stiffness, that of a plate beside the computed one
 SHEAR = 0.01  # of the deflection under a load across
 FAR = 0.5  # barrier distance over thickness
-COARSE = 2.0  # edge length over thickness and barrier distance
+COARSE = 2.0  # edge length over thickness and barrier distance, where something went through an edge
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(3)  # exact for the squares of parabolas
 
 
@@ -79,7 +81,7 @@ def validity_figures(scene: SceneConfig) -> Iterator[Figure]:
         thinnest[rod.name] = at_edges.thickness.min()
         yield from _of_section(rod, at_edges)
         if scene.contact is not None:
-            yield _of_edges(rod, longest_edge(scene, rod))
+            yield from _of_points(scene, rod, at_edges)
     if scene.contact is not None:
         yield _of_barrier(*min(thinnest.items(), key=lambda item: item[1]), scene.contact.barrier_distance)
 
@@ -193,18 +195,28 @@ def longest_edge(scene: SceneConfig, rod: Rod) -> float:
     return COARSE * float(edge_figures(scene, rod).thickness.min() + scene.contact.barrier_distance)
 
 
-def _of_edges(rod: Rod, longest: float) -> Figure:
-    """Return the figure of the edge length of a rod, which should be at most `longest` [m]."""
-    return Figure(
-        f"rods.{rod.name}",
-        "edge length",
-        f"{1e3 * rod.edge_length:.3g} mm",
-        f"at most {1e3 * longest:.3g} mm, {COARSE:g} times least thickness and barrier distance together",
-        rod.edge_length / longest,
-        "only nodes feel surfaces, and a small obstacle fits between them; more stations bring them closer"
-        if rod.edge_length > longest
-        else "",
-    )
+def _of_points(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
+    """Return how far apart a rod's contact points are for the surface that may sink deepest between them."""
+    shaped = [(body.name, body.surface) for body in scene.bodies if body.surface is not None]
+    shaped += [(obstacle.name, obstacle) for obstacle in scene.obstacles if obstacle.type != "plane"]
+    radius, distance, worst = 0.5 * float(at_edges.thickness.min()), scene.contact.barrier_distance, None
+    area = float(at_edges.width.max()) * rod.path.length
+    for name, surface in shaped:
+        demand = demand_of(shape_of(surface), area)
+        apart = spacing(demand, radius, distance)
+        sag = apart**2 / (4.0 * (demand[0] + radius))
+        if worst is None or sag > worst[0]:
+            worst = sag, apart, name
+    if worst is not None:
+        sag, apart, name = worst
+        yield Figure(
+            f"rods.{rod.name}",
+            f"contact points that meet {name} are at most",
+            f"{1e3 * apart:.2g} mm apart, between which it sinks by {1e3 * sag:.2g} mm",
+            f"at most {1e3 * distance:g} mm, the barrier distance",
+            sag / distance,
+            "its edges come into the rod between them: round them, or make its faces smaller" if sag > distance else "",
+        )
 
 
 def _eigenstrain_range(scene: SceneConfig, rod: Rod, layer: Layer, laws: tuple[Eigenstrain, ...]) -> np.ndarray:

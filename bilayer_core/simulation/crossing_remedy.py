@@ -25,10 +25,13 @@ def edge_of_strand(model: Model, edge: int) -> str:
 
 
 def more_stations(model: Model, number: int) -> Remedy:
-    """Return the remedy to use so many stations that small obstacles do not fit between neighbouring nodes."""
+    """Return the remedy to use so many stations that small obstacles do not fit between them."""
     edge, _ = crossed(model, number)
     strand = next(s for s in reversed(model.strands) if s.first_edge <= edge)
     rod = next(rod for rod in model.scene.rods if strand.rod in rod.copy_names)
     edges = max(FINER * (rod.stations - 1), math.ceil(rod.path.length / longest_edge(model.scene, rod)))
     key = f"rods.{rod.name}.stations"
-    return Remedy(f"set `{key}` to {edges + 1}: only nodes feel surfaces", {key: str(edges + 1)})
+    return Remedy(
+        f"set `{key}` to {edges + 1}: what went through it is sharper than its contact points are dense",
+        {key: str(edges + 1)},
+    )

@@ -147,7 +147,7 @@ def test_check_as_json_holds_the_same(capsys):
     report = json.loads(capsys.readouterr().out)
     assert report["terms"]["friction"] == "active"
     assert report["terms"]["damping"] == "skipped: damping.mass is zero"
-    assert "rods – ball (nodes and borders of ribbons against sphere)" in report["contact_pairs"]
+    assert "rods – ball (points all over ribbons against sphere)" in report["contact_pairs"]
     assert {stream["rate"] for stream in report["outputs"]} == {10.0}
     assert report["nodes"] == 4 * 50 + 1 and report["dof"] > 3 * report["nodes"]
     assert report["stepping"].startswith("adaptive") and set(report["reasons"]) == {

@@ -26,7 +26,8 @@ configuration_at, system_at = record_at(Configuration), record_at(System)
 @kernel
 def gap_between(surfaces, at, i, s):
     point, configuration = configuration_at(at).contact_point, configuration_at(at)
-    return gap_normal(surfaces_at(surfaces), configuration, i, s, point[i, 0], point[i, 1], point[i, 2])[0]
+    radius = surfaces_at(surfaces).radius[i]
+    return gap_normal(surfaces_at(surfaces), configuration, radius, s, point[i, 0], point[i, 1], point[i, 2])[0]
 
 
 @kernel
@@ -66,6 +67,9 @@ class Pair:
             near_contact_point=one,
             near_surface=one,
             near_count=np.ones(1, dtype=np.int64),
+            near_node=one,
+            near_arm=np.zeros(1, dtype=bool),
+            near_radius=np.array([0.01]),
         )
         self.position = np.concatenate(
             [self.place, self.contact_point + rng.uniform(-0.3, 0.3, (1, 3)), np.zeros((1, 3))]
@@ -105,7 +109,7 @@ class Border:
     surface at rest.
     """
 
-    def __init__(self, kind, rng, fast, held=()):
+    def __init__(self, kind, rng, fast, held=(), part=0.0):
         self.position, self.edges = rng.uniform(-0.8, 0.8, 3) + np.zeros((3, 3)), np.array([[0, 0], [0, 1], [1, 1]])
         self.position[[0, 2]] += [[-0.2, 0.0, 0.05], [0.2, 0.02, 0.0]]
         self.tangent = np.diff(self.position, axis=0)
@@ -115,7 +119,8 @@ class Border:
         self.m1 = m1 / np.linalg.norm(m1, axis=1, keepdims=True)
         self.arm = rng.uniform(-0.1, 0.1, (1, 2))
         self.place = rng.uniform(-0.1, 0.1, (1, 3))
-        self.step = rng.uniform(0.5, 2.0) * (self.place - self.position[1]) + fast * rng.standard_normal((3, 3))
+        aim = self.place - self.position[0 if part == -1.0 else 1]  # from where about the point is
+        self.step = rng.uniform(0.5, 2.0) * aim + fast * rng.standard_normal((3, 3))
         self.motion, self.base = np.zeros((2, 6)), np.zeros((2, 3))  # of the body and the world
         self.base[0], self.held = self.position[1] + rng.uniform(-0.2, 0.2, 3), list(held)
         self.motion[0] = [*self.step[1], *(10.0 * fast * rng.standard_normal(3))]
@@ -123,7 +128,15 @@ class Border:
         self.step[self.held] = self.motion[0, :3] + np.cross(self.motion[0, 3:], arms)
         self.turn = 10.0 * fast * rng.standard_normal(2)
         self.rotation = rotation_matrix(rng.standard_normal(3))[None]
-        self.points = RodPoints(first=3, node=np.array([1]), arm=self.arm, longest=float(np.linalg.norm(self.arm)))
+        self.along = np.array([0.5 * (part - part**2), 0.5 * (part + part**2)])
+        self.parts = np.array([0.5 - part, 0.5 + part])
+        self.points = RodPoints(
+            first=3,
+            node=np.array([1]),
+            arm=self.arm,
+            longest=float(np.linalg.norm(self.arm)) * np.abs(self.parts).sum(),
+            node_factor=abs(self.along[0]) + abs(1.0 + self.along[0] - self.along[1]) + abs(self.along[1]),
+        )
         one, moved_by = np.zeros(1, dtype=np.int64), np.full(4, -1)
         moved_by[self.held] = 0
         self.surfaces = record_of(
@@ -140,6 +153,10 @@ class Border:
             near_contact_point=one + 3,
             near_surface=one,
             near_count=one + 1,
+            near_node=one + 1,
+            near_arm=np.ones(1, dtype=bool),
+            near_mix=np.concatenate([self.along, self.parts, self.arm[0]])[None],
+            near_radius=np.array([0.01]),
         )
         self.strands = record_of(Strands, edge_node=np.array([0, 1]))
         self.system = record_of(System, node_step=self.step, angle_step=self.turn, motion=self.motion)
@@ -160,7 +177,7 @@ class Border:
             arc = axis * (np.arctan2(sine, self.tangent[e] @ tangent[e]) / sine if sine else 0.0)
             m1[e] = rotation_matrix(t * self.turn[e] * tangent[e]) @ rotation_matrix(arc) @ self.m1[e]
         m2 = np.cross(tangent, m1)
-        point = position[1] + 0.5 * (self.arm[0, 0] * m1 + self.arm[0, 1] * m2).sum(axis=0)
+        point = position[1] + self.along @ edge + self.parts @ (self.arm[0, 0] * m1 + self.arm[0, 1] * m2)
         return record_of(
             Configuration,
             contact_point=np.concatenate([position, point[None]]),
@@ -213,14 +230,18 @@ def test_step_bound_is_the_first_moment_at_which_a_gap_shrinks_to_the_kept_fract
     assert limited > 10
 
 
+PARTS = {"at a station": 0.0, "between stations": 0.4, "at an end": -1.0}
+
+
+@pytest.mark.parametrize("part", PARTS.values(), ids=PARTS)
 @pytest.mark.parametrize("held", [[], [0], [0, 2], [1]], ids=["free", "beside one", "between two", "held"])
 @pytest.mark.parametrize("fast", [0.01, 0.1, 0.5], ids=["slow", "fast", "turned over"])
 @pytest.mark.parametrize("kind", HALF_SIZES)
-def test_the_step_bound_of_a_point_with_an_arm_keeps_the_kept_fraction_of_its_gap(kind, fast, held):
+def test_the_step_bound_of_a_point_with_an_arm_keeps_the_kept_fraction_of_its_gap(kind, fast, held, part):
     rng = np.random.default_rng(6)
     limited = sharp = 0
     for _ in range(25):
-        pair = Border(kind, rng, fast, held)
+        pair = Border(kind, rng, fast, held, part)
         start = pair.gap(0.0)
         if start <= 0.0:
             continue
@@ -230,12 +251,13 @@ def test_the_step_bound_of_a_point_with_an_arm_keeps_the_kept_fraction_of_its_ga
     assert limited > 5 and (sharp > 0.5 * limited or fast > 0.01)
 
 
+@pytest.mark.parametrize("part", PARTS.values(), ids=PARTS)
 @pytest.mark.parametrize("held", [[], [0], [0, 2], [1]])
 @pytest.mark.parametrize("fast", [0.01, 0.1, 0.5])
-def test_no_point_with_an_arm_moves_farther_than_the_motion_that_lists_are_made_for(fast, held):
+def test_no_point_with_an_arm_moves_farther_than_the_motion_that_lists_are_made_for(fast, held, part):
     rng, nearest = np.random.default_rng(7), np.inf
     for _ in range(25):
-        pair = Border("plane", rng, fast, held)
+        pair = Border("plane", rng, fast, held, part)
         motion, start = pair.largest_motion(), pair.at(0.0).contact_point[3]
         for t in np.linspace(0.1, 1.0, 10):
             moved = np.linalg.norm(pair.at(t).contact_point[3] - start)
@@ -252,7 +274,9 @@ def test_a_list_of_near_pairs_holds_what_is_near_and_the_nearest():
     turn = np.array([rotation_matrix(rng.standard_normal(3)) for _ in kinds])
     radius, group = np.full(300, 0.01), np.tile([0, 1], 150)
     can_collide = np.array([[True, True], [True, False], [False, True], [True, True]])
-    listed = {name: np.zeros(1200, dtype=np.int64) for name in ("near_contact_point", "near_surface")}
+    listed = {name: np.zeros(1200, dtype=np.int64) for name in ("near_contact_point", "near_surface", "near_node")}
+    listed |= {name: np.zeros(1200) for name in ("near_gap", "near_radius", "near_weight")}
+    listed |= {"near_arm": np.zeros(1200, dtype=bool), "near_mix": np.zeros((1200, 6)), "sharpest": np.full(4, -1.0)}
     then = {"listed_contact_point": (300, 3), "listed_surface_position": (4, 3), "listed_surface_rotation": (4, 3, 3)}
     for reach, spread in ((0.05, 1.0), (0.01, 5.0)):
         place, contact_point = rng.uniform(-spread, spread, (4, 3)), rng.uniform(-spread, spread, (300, 3))
@@ -268,7 +292,7 @@ def test_a_list_of_near_pairs_holds_what_is_near_and_the_nearest():
             group=group,
             can_collide=can_collide,
             extent=np.zeros(4),
-            near_gap=np.zeros(1200),
+            weight=np.ones(300),
             **listed,
             **{name: np.zeros(shape) for name, shape in then.items()},
         )

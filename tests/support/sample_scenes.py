@@ -38,7 +38,7 @@ def everything(stations=6):
         [arm],
         gravity=[0.3, 0.2, -10.0],
         stimuli={"humidity": {"schedule": {"type": "hold", "value": 0.5}}},
-        bodies=[fixed("hub", (0, 0, 0.0425), contact_points=[point]), ball((0, 0, 0.0209), shell=True) | dragged],
+        bodies=[fixed("hub", (0, 0, 0.0425), contact_points=[point]), ball((0, 0, 0.0207), shell=True) | dragged],
         obstacles=[GROUND],
         contact=uneven,
         damping={"mass": 2.0},

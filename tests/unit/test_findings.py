@@ -49,20 +49,22 @@ def test_names_beyond_the_first_are_counted_only_if_there_are_two_or_more():
 
 
 def many(count=12, rods=None, **more):
-    """Strips whose edges are too long for the contact settings, the longest one last but one."""
+    """Strips over a box with edges too sharp for their points, the longest one last but one."""
     lengths = [0.1 + 0.01 * (k if k < count - 1 else 0) for k in range(count)]
     strips = [
         rod([layer(thickness=0.5e-3)], name=f"s{k}", start=(0, 0.02 * k, 0), length=length, width=0.004)
         for k, length in enumerate(lengths)
     ]
-    return scene(strips, contact={**contact(barrier_distance=1e-4), "rods": rods or False}, **more)
+    stone = {"name": "stone", "type": "box", "position": [0, 0, -0.1], "size": [0.1, 0.1, 0.1]}
+    settings = {**contact(barrier_distance=1e-4), "rods": rods or False}
+    return scene(strips, contact=settings, obstacles=[stone], **more)
 
 
 def test_warnings_of_many_rods_are_a_line_for_each_kind():
     warnings = make_plan(load_scene(many())).warnings
     assert len(warnings) == 2
     edges, passing = warnings
-    assert edges.startswith("rods.s10 (the worst of 12, with rods.s0, rods.s1 and 9 more): edge length 10 mm (at most")
+    assert edges.startswith("rods.s10 (the worst of 12, with rods.s0, rods.s1 and 9 more): contact points that meet")
     assert passing.startswith(
         "rods may pass through each other: s0 – s1, s0 – s2 and 64 more (contact.rods is false; by"
     )
@@ -71,7 +73,11 @@ def test_warnings_of_many_rods_are_a_line_for_each_kind():
 def test_pairs_of_rods_in_contact_are_told_by_kind_with_a_count():
     pairs = make_plan(load_scene(many(rods=True))).contact_pairs
     ribbons = "(round the curves of their nodes, without borders of ribbons)"
-    assert pairs == (f"s0 – itself, s1 – itself and 76 more {ribbons}",)
+    stone = "rods – stone (points all over ribbons against box)"
+    assert pairs == (
+        stone,
+        f"s0 – itself, s1 – itself and 76 more {ribbons}",
+    )
 
 
 def test_figures_within_their_range_tell_the_one_nearest_to_the_limit():

@@ -13,7 +13,8 @@ class RodPoints:
     first: int  # of them among contact points
     node: Indices  # ascending, shape (n_rod_point,)
     arm: Matrix  # along m1 and m2, means of the node's edges [m], shape (n_rod_point, 2)
-    longest: float  # of the arms [m]
+    longest: float  # of all arms, times the sum of both parts [m]
+    node_factor: float  # how much farther than nodes a point of their curve moves at most
 
 
 @record
@@ -30,6 +31,9 @@ class Surfaces:
     stiffness: float  # of the barrier [Pa]
     radius: Vector  # half the thickness, offset, or radius [m], shape (n_contact_point,)
     weight: Vector  # Δl of the barrier [m], 0 of a node that its rod points stand for, shape (n_contact_point,)
+    section: Matrix  # half thickness, border, height of nodes, Δl of the path (0 of copies) [m], shape (n_node, 4)
+    node_part: Matrix  # of the edges before and after in the directions at nodes, shape (n_node, 2)
+    edge_length: Vector  # at rest [m], shape (n_edge,)
     contact_point_body: Indices  # body that takes the force, −1 for those of rods, shape (n_contact_point,)
     free_index: Indices  # indices of all bodies among the free ones; none if none is free
     moved_by: Indices  # body that moves it, −1 for those of rods that none holds, shape (n_contact_point,)
@@ -48,14 +52,26 @@ class Surfaces:
     position: Matrix  # in the body's frame [m], shape (n_surface, 3)
     rotation: Stack  # its own axes in the body's frame, shape (n_surface, 3, 3)
     can_collide: FlagTable  # whether contact points of a group can meet it, shape (n_surface, n_group)
+    node_can_collide: FlagTable  # whether a station can meet it, shape (n_surface, n_node)
+    edge_can_collide: FlagTable  # whether what is between two can, shape (n_surface, n_edge)
+    dense: bool  # whether points between stations meet one
+    sharpest: Vector  # least radius of what is not flat, −1 if all is [m], shape (n_surface,)
+    least_spacing: Vector  # of points between stations [m], shape (n_surface,)
     edge_can_cross: FlagTable  # whether it could come between the nodes of an edge, shape (n_surface, n_edge)
     near_contact_point: Indices = ("near",)
     near_surface: Indices = ("near",)
     near_gap: Vector = ("near",)
+    near_node: Indices = ("near",)  # of contact points of rods, those of others themselves
+    near_arm: Flags = ("near",)  # whether it is not the node itself
+    near_mix: Matrix = ("near", 6)  # of its edges; see `contact.near`
+    near_radius: Vector = ("near",)  # [m]
+    near_weight: Vector = ("near",)  # Δl of the barrier [m]
     near_count: Indices = (1,)
     margin: Vector  # shape (1,)
     extent: Vector = ("surface",)
     listed_contact_point: Matrix = ("contact_point", 3)
+    listed_director1: Matrix = ("edge", 3)
+    listed_director2: Matrix = ("edge", 3)
     listed_surface_position: Matrix = ("surface", 3)
     listed_surface_rotation: Stack = ("surface", 3, 3)
     first_position: Matrix = ("node", 3)  # of nodes at the start of the step [m]
@@ -96,6 +112,7 @@ class Sliding:
     first: Indices = ("near",)
     node: Indices = ("near",)  # of contacts of rods
     surface: Indices = ("near",)
+    part: Matrix = ("near", 2)  # along the edge after the node, and across: which of the points of a node it is
     load: Vector = ("near",)
     last_load: Vector = ("near",)  # before contacts were frozen anew
     change: Vector = ("near",)  # of normal forces then, before relaxation

@@ -12,10 +12,9 @@ class Configuration:
     Sizes in shapes are those of `model.sizes`.
     """
 
-    contact_point: Matrix = ("contact_point", 3)  # all [m]: nodes, points of bodies, and those of rods with an arm
+    contact_point: Matrix = ("contact_point", 3)  # [m]: nodes and points of bodies
     position: Matrix = ("node", 3)  # of nodes [m]
     point: Matrix = ("point", 3)  # of contact points on bodies [m]
-    rod_point: Matrix = ("rod point", 3)  # and of those with an arm from a node [m]
     length: Vector = ("edge+clamp",)  # of edges and clamp edges [m]
     tangent: Matrix = ("edge+clamp", 3)  # of edges and clamp edges, unit
     director1: Matrix = ("edge+clamp", 3)  # likewise
