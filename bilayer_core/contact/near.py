@@ -135,7 +135,7 @@ def spacing_between(surfaces, s, radius):
 @kernel
 def _list_between(surfaces, at, s, limit, count):
     """List the points between stations and across the width whose gap to surface s is at most `limit`."""
-    edges, section, x = surfaces.node_edges, surfaces.section, at.surface_position
+    edges, section = surfaces.node_edges, surfaces.section
     for i in range(edges.shape[0]):
         b, a = edges[i, 0], edges[i, 1]
         if section[i, 3] == 0.0 or not (surfaces.edge_can_collide[s, b] or surfaces.edge_can_collide[s, a]):
@@ -146,7 +146,7 @@ def _list_between(surfaces, at, s, limit, count):
             if not single:
                 continue
         spacing = spacing_between(surfaces, s, section[i, 0])
-        longest = max(at.length[b], at.length[a])
+        longest, thickest = max(at.length[b], at.length[a]), section[i + 1, 0]
         parts = 2 * int(math.ceil(0.5 * (max(surfaces.edge_length[b], surfaces.edge_length[a]) / spacing - 1.0))) + 1
         first, last = -(parts // 2), parts // 2
         if inner and edges[i - 1, 0] == edges[i - 1, 1] and section[i - 1, 3] > 0.0:
@@ -154,11 +154,11 @@ def _list_between(surfaces, at, s, limit, count):
         if edges[i + 1, 0] == edges[i + 1, 1] and section[i + 1, 3] > 0.0:
             last = parts
         first = first if inner else 0
-        reach = surfaces.bound[s] + section[i, 0] + limit
-        square = 0.0
-        for c in range(3):
-            square += (at.position[i, c] - x[s, c]) ** 2
-        if square > (reach + 1.25 * longest + surfaces.rod_points.longest) ** 2:
+        if inner:
+            thickest = max(thickest, section[i - 1, 0])
+        x = row(at.position, i)
+        gap = gap_normal(surfaces, at, max(thickest, section[i, 0]), s, x[0], x[1], x[2])[0]
+        if gap > limit + 1.25 * longest + surfaces.rod_points.longest:  # a gap changes by no more than the way
             continue
         for j in range(first, last + 1):
             other, part = i - 1 if j < 0 else i + 1, j / parts
@@ -203,35 +203,24 @@ def _list_between(surfaces, at, s, limit, count):
 def _list_across(surfaces, at, s, i, mix, spacing, radius, weight, limit, count):
     """List those of one section, whose borders are at ± w of the mix and whose weight together is `weight`.
 
-    They lie on a line; only its part within the ball that holds the surface is looked at.
+    They lie on a line, along which a gap changes by no more than the way, so points from where it is large are passed.
     """
     along_b, along_a, part_b, part_a, height, border = mix
-    c = rod_point(surfaces, at, i, (along_b, along_a, part_b, part_a, height, 0.0))
-    half = int(math.ceil(border / spacing))
-    first, last = -half, half
+    half, step = int(math.ceil(border / spacing)), 0.0
     if half > 0:
+        c = rod_point(surfaces, at, i, (along_b, along_a, part_b, part_a, height, 0.0))
         e = rod_point(surfaces, at, i, mix)
-        dd = de = ee = 0.0
-        for m in range(3):
-            d, w = c[m] - at.surface_position[s, m], e[m] - c[m]
-            dd, de, ee = dd + d * d, de + d * w, ee + w * w
-        reach = surfaces.bound[s] + radius + limit
-        inside = de * de - ee * (dd - reach * reach)
-        if inside < 0.0:
-            return count
-        if inside < math.inf:
-            root = math.sqrt(inside)
-            first = max(first, int(math.floor(half * (-de - root) / ee)))
-            last = min(last, int(math.ceil(half * (-de + root) / ee)))
-    for k in range(first, last + 1):
-        across = border * k / half if half > 0 else 0.0
-        own = along_b, along_a, part_b, part_a, height, across
+        step = math.sqrt((e[0] - c[0]) ** 2 + (e[1] - c[1]) ** 2 + (e[2] - c[2]) ** 2) / half
+    k = -half
+    while k <= half:
+        own = along_b, along_a, part_b, part_a, height, border * k / half if half > 0 else 0.0
         p = rod_point(surfaces, at, i, own)
         gap = gap_normal(surfaces, at, radius, s, p[0], p[1], p[2])[0]
         if gap <= limit:
             share = weight if half == 0 else weight * (0.25 if abs(k) == half else 0.5) / half
             _note(surfaces, count, i, s, gap, i, True, own, radius, share)
             count += 1
+        k += max(1, int(min((gap - limit) / step, 2.0 * half))) if gap > limit and step > 0.0 else 1
     return count
 
 

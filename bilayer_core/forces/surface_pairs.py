@@ -24,11 +24,12 @@ def list_surface_pairs(surfaces, at, motion):
 
     Returns a status.
     """
-    if moved_since(surfaces, at) + motion <= surfaces.margin[0]:
-        return READY
     margin = max(surfaces.d_hat, MOTION_MARGIN * motion)
-    if surfaces.dense:
+    if surfaces.dense:  # a wide list holds very many points
         margin = min(margin, motion + MOTION_MARGIN * surfaces.d_hat)
+    wide = surfaces.dense and surfaces.margin[0] > MOTION_MARGIN * (motion + MOTION_MARGIN * surfaces.d_hat)
+    if not wide and moved_since(surfaces, at) + motion <= surfaces.margin[0]:
+        return READY
     count = list_near(surfaces, at, margin)
     if count > surfaces.near_contact_point.shape[0]:
         surfaces.margin[0] = -1.0

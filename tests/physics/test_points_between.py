@@ -7,6 +7,7 @@ from support.sample_scenes import contact, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.contact.near import SAG
+from bilayer_core.errors import PenetrationError
 from bilayer_core.model.points_between import points_between
 
 WIDE = {"gel": {"youngs_modulus": 1e6, "poisson_ratio": 0.4, "density": 1000.0, "retardation_time": 0.01}}
@@ -87,3 +88,10 @@ def test_the_points_that_kernels_make_are_those_of_the_pattern(stations, dimensi
     found = sorted(zip(gap[near], weight[near], node[near], strict=True))
     assert len(found) == len(expected) > 3
     assert np.array(found) == pytest.approx(np.array(sorted(expected)), rel=1e-6, abs=1e-8)  # one step has moved it
+
+
+def test_a_ball_that_starts_inside_a_strip_beside_its_borders_and_middle_is_refused():
+    place = (0.0012, 0.0045, 0.5e-3 + 0.5 * THICK - 1e-5)
+    content = wide_strip({"shape": "sphere", "radius": 0.5e-3}, (place, [0, 0, 0]))
+    with pytest.raises(PenetrationError, match=r"node 2\d of rod/only at .* mm behind the surface of body peg"):
+        Simulator(load_scene(content))
