@@ -3,17 +3,20 @@
 Along a straight step a point nears a segment no faster than it nears one of the segment's ends, v = max |δp − δx_j|,
 |δp − δx_{j+1}|, so the distance D falls by at most v β over the fraction β. The step is gone through in parts that use
 up no more than what is left of D above the distance to keep; these are long where the two do not meet head-on, and a
-few of them come as near as `TOUCH` of the gap.
+few of them come as near as `TOUCH` of the gap. Rails (`contact.rails`) go faster than their nodes by their swings at
+most; where they are by then is computed exactly.
 """
 
 from __future__ import annotations
 
 import math
 
+from bilayer_core.contact.rails import rail_in_step
 from bilayer_core.contact.rod_list import FIRST, PATH
 from bilayer_core.contact.segment import SLACK
 from bilayer_core.contact.step_bound import KEPT_FRACTION
 from bilayer_core.jit import kernel
+from bilayer_core.kinematics.vector import combine, combine3, dot
 
 TOUCH = 0.05  # of the gap: nearer to the distance to keep than this, the search ends
 MAX_PARTS = 1000
@@ -21,8 +24,8 @@ FAR, NEAR = 8.0, 2.0  # barrier distances: `KEPT_FRACTION` of one and `TOUCH` of
 
 
 @kernel
-def rod_step_bound(rods, position, step, limit, closing):
-    """Largest α ≤ `limit` found such that all gaps keep `KEPT_FRACTION` of themselves along x + β step, 0 ≤ β ≤ α.
+def rod_step_bound(rods, strands, system, at, position, limit, closing):
+    """Largest α ≤ `limit` found such that all gaps keep `KEPT_FRACTION` of themselves in all parts of a step up to α.
 
     A pair that stays beyond the barrier distance sets no bound: of large gaps less is kept. So what is found does not
     depend on which of these pairs are listed, or looked at.
@@ -30,13 +33,17 @@ def rod_step_bound(rods, position, step, limit, closing):
     Parameters
     ----------
     rods : RodContact
-    position, step : Array
-        Of nodes [m], shape (n_node, 3).
+    strands : Strands
+    system : System
+        With the step.
+    at : Configuration
+    position : Array
+        Of rails [m], shape (n_node, 3).
     limit : float
     closing : float
         By how much gaps close in the part of the step up to `limit` at most [m].
     """
-    search, d_hat, alpha = rods.search, rods.d_hat, limit
+    search, d_hat, alpha, step, rails = rods.search, rods.d_hat, limit, system.node_step, rods.rails
     # Up to this path a pair keeps clear of the barrier in the step, or keeps enough of its gap head-on.
     looked = rods.ways[PATH] + min(closing, closing / (1.0 - KEPT_FRACTION) - d_hat)
     if looked < rods.ways[FIRST]:
@@ -54,6 +61,8 @@ def rod_step_bound(rods, position, step, limit, closing):
             left += (own - step[j, m]) ** 2
             right += (own - step[j + 1, m]) ** 2
         speed = math.sqrt(max(left, right))
+        if rails.exists:
+            speed += max(rails.swing[i], rails.swing[i + 1]) + max(rails.swing[j], rails.swing[j + 1])
         square = _square_distance(position, step, 0.0, i, s, j)
         if square > (radii + speed * alpha / (1.0 - KEPT_FRACTION)) ** 2 * SLACK:
             continue  # even head-on
@@ -68,7 +77,11 @@ def rod_step_bound(rods, position, step, limit, closing):
                 break
             gone += left_over / speed
             if gone < alpha:
-                left_over = math.sqrt(_square_distance(position, step, gone, i, s, j)) - radii - keep
+                if rails.exists:
+                    square = _square_distance_of_rails(rails, strands, system, at, gone, i, s, j)
+                else:
+                    square = _square_distance(position, step, gone, i, s, j)
+                left_over = math.sqrt(square) - radii - keep
             part += 1
     return alpha
 
@@ -76,18 +89,34 @@ def rod_step_bound(rods, position, step, limit, closing):
 @kernel
 def _square_distance(position, step, fraction, i, s, j):
     """Square of the distance of the point at s on (i, i+1) from the segment (j, j+1) at x + fraction · step [m²]."""
-    p0 = (1.0 - s) * (position[i, 0] + fraction * step[i, 0]) + s * (position[i + 1, 0] + fraction * step[i + 1, 0])
-    p1 = (1.0 - s) * (position[i, 1] + fraction * step[i, 1]) + s * (position[i + 1, 1] + fraction * step[i + 1, 1])
-    p2 = (1.0 - s) * (position[i, 2] + fraction * step[i, 2]) + s * (position[i + 1, 2] + fraction * step[i + 1, 2])
-    x0, x1, x2 = (
-        position[j, 0] + fraction * step[j, 0],
-        position[j, 1] + fraction * step[j, 1],
-        position[j, 2] + fraction * step[j, 2],
+    x0, x1 = _moved(position, step, fraction, i), _moved(position, step, fraction, i + 1)
+    return _between(x0, x1, s, _moved(position, step, fraction, j), _moved(position, step, fraction, j + 1))
+
+
+@kernel
+def _moved(position, step, fraction, i):
+    """Row i of x + fraction · step, as a tuple."""
+    return (
+        position[i, 0] + fraction * step[i, 0],
+        position[i, 1] + fraction * step[i, 1],
+        position[i, 2] + fraction * step[i, 2],
     )
-    e0 = position[j + 1, 0] + fraction * step[j + 1, 0] - x0
-    e1 = position[j + 1, 1] + fraction * step[j + 1, 1] - x1
-    e2 = position[j + 1, 2] + fraction * step[j + 1, 2] - x2
-    p0, p1, p2 = p0 - x0, p1 - x1, p2 - x2
-    t = min(max((p0 * e0 + p1 * e1 + p2 * e2) / (e0 * e0 + e1 * e1 + e2 * e2), 0.0), 1.0)
-    p0, p1, p2 = p0 - t * e0, p1 - t * e1, p2 - t * e2
-    return p0 * p0 + p1 * p1 + p2 * p2
+
+
+@kernel
+def _square_distance_of_rails(rails, strands, system, at, fraction, i, s, j):
+    """Likewise between rails [m²]."""
+    x0 = rail_in_step(rails, strands, system, at, i, fraction)
+    x1 = rail_in_step(rails, strands, system, at, i + 1, fraction)
+    y0 = rail_in_step(rails, strands, system, at, j, fraction)
+    return _between(x0, x1, s, y0, rail_in_step(rails, strands, system, at, j + 1, fraction))
+
+
+@kernel
+def _between(x0, x1, s, y0, y1):
+    """Square of the distance of the point at s between x0 and x1 from the segment between y0 and y1 [m²]."""
+    p = combine3(1.0 - s, x0, s, x1, -1.0, y0)
+    e = combine(1.0, y1, -1.0, y0)
+    t = min(max(dot(p, e) / dot(e, e), 0.0), 1.0)
+    r = combine(1.0, p, -t, e)
+    return dot(r, r)

@@ -6,6 +6,9 @@ nearer than the barrier distance while nodes are no farther than m/2 from that m
 towards each other, not how far they go, and lists are short. A short motion is prolonged, so that the list serves the
 steps to come if they go on as straight as that.
 
+Where rods meet off their nodes, all this is about their rails (`contact.rails`). Their way in a step is not straight:
+the margin covers by how much at most they *stray* from it.
+
 A gap closes by no more than twice what nodes go, the mean taken off. The sum of that over all moves since a list was
 made is its *path*; a pair is not looked at again before the path is longer by what the gap was above the barrier
 distance when it was found, in making the list or later. So most pairs cost a comparison.
@@ -29,9 +32,8 @@ it to serve, its path [m], and that before which none of its pairs comes to the 
 
 
 @kernel
-def reachable(step, unit):
-    """Largest motion of a node in a step [m], the mean of all taken off, and the part of the step for which there can
-    be a list.
+def largest_motion(step):
+    """Largest motion of a node in a step [m], the mean of all taken off.
 
     A translation common to all nodes brings none of them nearer to another.
     """
@@ -40,8 +42,14 @@ def reachable(step, unit):
     for i in range(step.shape[0]):
         d0, d1, d2 = step[i, 0] - m0, step[i, 1] - m1, step[i, 2] - m2
         square = max(square, d0 * d0 + d1 * d1 + d2 * d2)
-    move, largest = math.sqrt(square), LARGEST_MOVE * unit
-    return move, largest / move if move > largest else 1.0
+    return math.sqrt(square)
+
+
+@kernel
+def reachable(move, limit, unit):
+    """Return the part of a step, up to `limit`, for which there can be a list if all move by `move` in it [m]."""
+    largest = LARGEST_MOVE * unit
+    return largest / move if limit * move > largest else limit
 
 
 @kernel
@@ -83,8 +91,9 @@ def _stray(search, position, step, fraction):
 
 
 @kernel
-def list_serves(rods, position, step, fraction, move):
-    """Return whether the list holds all pairs nearer than the barrier distance at x + β step, 0 ≤ β ≤ `fraction`.
+def list_serves(rods, position, step, fraction, move, stray):
+    """Return whether the list holds all pairs nearer than the barrier distance at x + β step, 0 ≤ β ≤ `fraction`, and
+    up to `stray` from there.
 
     Parameters
     ----------
@@ -95,6 +104,8 @@ def list_serves(rods, position, step, fraction, move):
     fraction : float
     move : float
         Largest motion in that part of the step, see `reachable` [m].
+    stray : float
+        [m]
     """
     ways = rods.ways
     if move == 0.0:  # nodes are at x now
@@ -115,11 +126,11 @@ def list_serves(rods, position, step, fraction, move):
     ways[LEFT] = 0.5 * ways[MADE] - _stray(rods.search, position, step, 0.0)
     if ways[LEFT] < 0.0:
         return False
-    return move <= ways[LEFT] or _stray(rods.search, position, step, fraction) <= 0.5 * ways[MADE]
+    return move <= ways[LEFT] or _stray(rods.search, position, step, fraction) + stray <= 0.5 * ways[MADE]
 
 
 @kernel
-def begin_list(rods, position, step, fraction, move):
+def begin_list(rods, position, step, fraction, move, stray):
     """Have the motion for which a list is made next, the mean of all nodes taken off at either end; nodes go on from
     its beginning. Parameters are as for `list_serves`; returns the margin [m].
     """
@@ -134,7 +145,7 @@ def begin_list(rods, position, step, fraction, move):
         tip[i, 0] = x0 + length * (step[i, 0] - w0)
         tip[i, 1] = x1 + length * (step[i, 1] - w1)
         tip[i, 2] = x2 + length * (step[i, 2] - w2)
-    margin = MARGIN * rods.unit
+    margin = MARGIN * rods.unit + 2.0 * stray
     rods.ways[MADE], rods.ways[LEFT], rods.ways[PATH] = margin, 0.5 * margin, 0.0
     return margin
 

@@ -10,7 +10,7 @@ from bilayer_core.contact.broad_phase import RodSearch
 from bilayer_core.forces.restitution import damping_of
 from bilayer_core.model.lit_elements import light_of
 from bilayer_core.model.model import Model
-from bilayer_core.model.records.contacts import ContactColumns, Restitution, RodContact, RodContactList, Slips
+from bilayer_core.model.records.contacts import ContactColumns, Rails, Restitution, RodContact, RodContactList, Slips
 from bilayer_core.model.records.parts import PointForces
 from bilayer_core.model.records.problem import Border, System
 from bilayer_core.scene.config import Friction
@@ -89,6 +89,7 @@ def rod_contact_of(
     model: Model,
     sizes: dict[str, int],
     search: RodSearch,
+    rails: Rails,
     now: RodContactList,
     old: RodContactList,
     law: Friction | None,
@@ -107,6 +108,7 @@ def rod_contact_of(
         threshold=law.speed_threshold if law is not None else 1.0,
         unit=contact.barrier_distance + 2.0 * float(search.edge_radius.max()),
         point_weight=model.rod_point_weight,
+        rails=rails,
         search=search,
         contacts=now,
         sliding=old,
@@ -116,11 +118,9 @@ def rod_contact_of(
 
 def contact_columns_of(model: Model, sizes: dict[str, int], capacity: int) -> ContactColumns:
     """With capacity for so many contacts of barrier and friction together."""
-    attached = np.full(model.node_count, -1)
-    attached[model.constrained.node] = np.arange(len(model.constrained.node))
     return ContactColumns.zeros(
         sizes | {"contact": capacity},
         strand=np.repeat(np.arange(len(model.strands)), [s.node_count for s in model.strands]),
-        attached=attached,
-        joined=np.isin(np.arange(model.node_count), model.joined_node),
+        attached=model.solved_layout.attached_of_unknown,
+        joined=model.joins.column >= 0 if model.joins.exists else np.zeros(model.solved_layout.size, dtype=bool),
     )

@@ -360,8 +360,10 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
 
 @kernel
 def _least_gap_of_rods(rods):
-    """Gap above which contacts of rods are not counted [m]; infinite where rods cannot meet."""
-    return rods.d_hat if rods.exists else math.inf
+    """Gap above which contacts of rods are not counted, in motions of nodes [m]; infinite where rods cannot meet."""
+    if not rods.exists:
+        return math.inf
+    return rods.d_hat / rods.rails.factor if rods.rails.exists else rods.d_hat
 
 
 @kernel

@@ -5,6 +5,7 @@ from __future__ import annotations
 from bilayer_core.contact.barrier import barrier_gradient
 from bilayer_core.contact.near import gap_normal, place_of
 from bilayer_core.forces.bend_twist import bend_by_strains
+from bilayer_core.forces.rail_arms import write_rail_motions
 from bilayer_core.forces.rod_arms import add_step_of_arm, write_material_rate
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.stack import stack_matrix, stack_vector
@@ -149,13 +150,15 @@ def _power_of_barriers(p, at, point, rates):
             slope = surfaces.stiffness * surfaces.near_weight[k] * barrier_gradient(d, surfaces.d_hat)
             power += slope * (velocity[0] * n0 + velocity[1] * n1 + velocity[2] * n2)
     if rods.exists:
-        contacts = rods.contacts
+        contacts, v, rails = rods.contacts, point.velocity, rods.rails
+        if rails.exists and contacts.count[0] > 0:
+            write_rail_motions(rails, p.strands, rails.rate, point.velocity, point.spin, rails.node_motion)
+            v = rails.node_motion
         for c in range(contacts.count[0]):
             i, j = contacts.node[c, 0], contacts.node[c, 1]
             scale = 0.5 * contacts.multiplicity[c] * rods.stiffness * rods.point_weight[contacts.point[c]]
             rate = 0.0
             for m in range(3):
-                v = point.velocity
                 moved = contacts.weight[c, 0] * v[i, m] + contacts.weight[c, 1] * v[i + 1, m]
                 moved += contacts.weight[c, 2] * v[j, m] + contacts.weight[c, 3] * v[j + 1, m]
                 rate += contacts.normal[c, m] * moved

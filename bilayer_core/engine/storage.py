@@ -159,7 +159,10 @@ class Storage:
         ways = np.array([0.0, -1.0, 0.0, -np.inf]) if before is None else before.rod_contact.ways
         last = np.zeros((self.sizes["node"], 3)) if before is None else before.rod_contact.last
         law = friction_law(self._model.scene, self._model.forces, self._friction)
-        return rod_contact_of(self._model, self.sizes, self._pairs.search, now, of_stage, law, ways=ways, last=last)
+        rails = self._model.rails.allocated(self.sizes) if before is None else before.rod_contact.rails
+        return rod_contact_of(
+            self._model, self.sizes, self._pairs.search, rails, now, of_stage, law, ways=ways, last=last
+        )
 
     def take_scene(self, model: Model) -> None:
         """Have the same model with another scene, whose coefficients of friction may be others."""

@@ -91,5 +91,5 @@ def limit_by_friction(p, at, stage, slope, bound):
         count = sliding.count[0]
         slip_paths(sliding, p.surfaces, p.strands, at, stage, system, slips.path)
     if p.rod_contact.exists:
-        count = rod_slip_along(p.rod_contact, stage, at.position, system.node_step, count, slips.path)
+        count = rod_slip_along(p.rod_contact, p.strands, stage, at, system, count, slips.path)
     return friction_limit(count, slips.path, slips.threshold, slope, bound) if count > 0 else bound

@@ -8,8 +8,10 @@ their weights w = (1 − s, s, −(1 − t), −t), the vector between the two i
 
     C = ± ½ K_c b(d) Δl,   d = D − r_p − r_segment        (Δl: the length of rod that p stands for)
 
-as for surfaces (`forces.surface_barrier`). Both rods have points, so the contact of two parallel rods is counted from
-either side, half each: K_c b per length, on any pair of meshes. With e the segment, u its direction and v = n × u,
+as for surfaces (`forces.surface_barrier`). Where layers differ, the x are those of rails, in the middle between the
+faces (`contact.rails`), and what follows are derivatives by these; `forces.rail_arms` hands them on to nodes and edges.
+Both rods have points, so the contact of two parallel rods is counted from either side, half each: K_c b per length, on
+any pair of meshes. With e the segment, u its direction and v = n × u,
 
     ∂D/∂x_m = w_m n                                                        (t is the minimum: its change does not count)
     ∂²D/∂x_m ∂x_l = [w_m w_l (I − n nᵀ) − a_m a_lᵀ]/D,   a_m = w_m u + (D/|e|) β_m n,   β = (0, 0, −1, 1)
@@ -27,8 +29,9 @@ seen here.
 
     slip g = (I − n nᵀ) Σ w_m (x_m − x_m⁰),   D = μ λ h f₀(|g|/h),   force ∓ μ λ f₁ g/|g|, shared out with w_m
 
-The two forces are equal and opposite. They act on the two centrelines, a distance D apart along n, so a couple of D
-times the friction remains: rods have no moment about their tangent from friction on their faces.
+(of a rail with its rate by nodes and edges frozen, too, so that the slip is linear in the unknowns). The two
+forces are equal and opposite. They act on the two middles, a distance D apart along n, so a couple of D times the
+friction remains: rods have no moment about their tangent from friction on their faces.
 
 What is computed does not depend on the list of near pairs, which holds all contacts at any time, always in the same
 order; see `contact.rod_list`.
@@ -41,9 +44,17 @@ import math
 from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hessian
 from bilayer_core.contact.broad_phase import near_pairs
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
+from bilayer_core.contact.rails import most_of_turn, place_rails, write_rail_steps, write_swings
 from bilayer_core.contact.rod_bound import rod_step_bound
-from bilayer_core.contact.rod_list import FIRST, PATH, begin_list, end_list, list_serves, reachable
+from bilayer_core.contact.rod_list import FIRST, PATH, begin_list, end_list, largest_motion, list_serves, reachable
 from bilayer_core.contact.segment import facing_contacts
+from bilayer_core.forces.rail_arms import (
+    hand_on,
+    write_rail_curvature,
+    write_rail_motions,
+    write_rail_rates,
+    write_rail_slips,
+)
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.record import Matrix
 from bilayer_core.jit.stack import stack_vector
@@ -57,15 +68,15 @@ from bilayer_core.model.records.step import Configuration, Stage
 ROD_BARRIER, ROD_FRICTION = map(slot_of, ("rod barrier", "rod friction"))
 
 
-@piece(bool, Problem, Matrix, Matrix, float, float)
-def list_near_rods(p, position, step, fraction, move):
-    """Have a list of near pairs for a part of a step of nodes from `position`, in which they move by `move` [m]; false
-    if there is no capacity for it.
+@piece(bool, Problem, Matrix, Matrix, float, float, float)
+def list_near_rods(p, position, step, fraction, move, stray):
+    """Have a list of near pairs for a part of a step of rails from `position`, in which they move by `move` [m] and
+    stray by `stray` [m] from a straight way; false if there is no capacity for it.
     """
     rods = p.rod_contact
-    if list_serves(rods, position, step, fraction, move):
+    if list_serves(rods, position, step, fraction, move, stray):
         return True
-    margin = begin_list(rods, position, step, fraction, move)
+    margin = begin_list(rods, position, step, fraction, move, stray)
     near_pairs(rods.search, rods.d_hat, rods.d_hat + margin)
     return end_list(rods)
 
@@ -73,13 +84,16 @@ def list_near_rods(p, position, step, fraction, move):
 @piece(bool, Problem, Configuration)
 def find_rod_contacts(p, at):
     """Find where rods are nearer to each other than the barrier distance; false if there is no capacity for that."""
-    rods = p.rod_contact
-    if not list_near_rods(p, at.position, rods.no_step, 0.0, 0.0):
+    rods, place = p.rod_contact, at.position
+    if rods.rails.exists:
+        place_rails(rods.rails, at)
+        place = rods.rails.place
+    if not list_near_rods(p, place, rods.no_step, 0.0, 0.0, 0.0):
         return False
     found, gap = rods.contacts.count, math.inf
     found[0] = 0
     if rods.ways[PATH] >= rods.ways[FIRST]:
-        found[0], gap, rods.ways[FIRST] = facing_contacts(rods, at.position, rods.ways[PATH])
+        found[0], gap, rods.ways[FIRST] = facing_contacts(rods, place, rods.ways[PATH])
     rods.gap[0] = gap
     return found[0] <= rods.contacts.point.shape[0]
 
@@ -89,11 +103,22 @@ def bound_between_rods(p, at):
     """Largest fraction of `System.node_step` that keeps rods apart; the status is left in `Outcome`."""
     rods, step, status = p.rod_contact, p.system.node_step, p.outcome.counts
     status[STATUS] = READY
-    move, limit = reachable(step, rods.unit)
-    if not list_near_rods(p, at.position, step, limit, limit * move):
+    rails, place = rods.rails, at.position
+    move, limit, swing, stray = largest_motion(step), 1.0, 0.0, 0.0
+    if rails.exists:
+        place_rails(rails, at)
+        place = rails.place
+        limit = most_of_turn(rails, p.strands, p.system, at)
+        swing = write_swings(rails, p.strands, p.system, at, limit)
+        move += 2.0 * swing  # the mean of all taken off
+    limit = reachable(move, limit, rods.unit)
+    if rails.exists:
+        write_rail_steps(rails, p.strands, p.system, at, limit)
+        step, stray = rails.step, 0.5 * limit * swing
+    if not list_near_rods(p, place, step, limit, limit * move, stray):
         status[STATUS] = ROD_CAPACITY_EXCEEDED
         return 0.0
-    return rod_step_bound(rods, at.position, step, limit, 2.0 * limit * move)
+    return rod_step_bound(rods, p.strands, p.system, at, place, limit, 2.0 * limit * move)
 
 
 @piece(int, RodContact, Problem, Configuration, Stage)
@@ -117,10 +142,18 @@ def _freeze(rods):
             sliding.weight[c, m] = found.weight[c, m]
 
 
+@kernel
+def _freeze_at(rods, strands, at):
+    """Freeze contacts, and the rates of rails, for friction."""
+    _freeze(rods)
+    if rods.rails.exists and rods.sliding.count[0] > 0:
+        write_rail_rates(rods.rails, strands, at, rods.rails.slip_rate)
+
+
 @piece(int, RodContact, Problem, Configuration, Stage)
 def start_rod_friction(rods, p, start, stage):
     """Freeze the contacts of friction at the start of a stage, which were found before."""
-    _freeze(rods)
+    _freeze_at(rods, p.strands, start)
     return READY
 
 
@@ -128,7 +161,7 @@ def start_rod_friction(rods, p, start, stage):
 def settle_rod_friction(rods, p, at, stage):
     """Freeze the contacts of friction at a minimum; whether there are any, now or before."""
     before = rods.sliding.count[0]
-    _freeze(rods)
+    _freeze_at(rods, p.strands, at)
     return before + rods.sliding.count[0] > 0
 
 
@@ -137,7 +170,16 @@ def add_rod_barrier(rods, p, at, stage, with_hessian):
     """Barrier at the contacts found last; returns the smallest gap below the barrier distance [m]."""
     sums = p.sums
     if rods.contacts.count[0] > 0 and sums.selected[ROD_BARRIER]:
-        sums.energy[ROD_BARRIER] = _add_barrier(rods, at.position, sums.contact_point)
+        rails = rods.rails
+        if not rails.exists:
+            sums.energy[ROD_BARRIER] = _add_barrier(rods, at.position, sums.contact_point)
+        else:
+            rails.gradient[:] = 0.0
+            sums.energy[ROD_BARRIER] = _add_barrier(rods, rails.place, rails.gradient)
+            write_rail_rates(rails, p.strands, at, rails.rate)
+            hand_on(rails, p.strands, rails.gradient, rails.rate, sums.contact_point, sums.edge)
+            if with_hessian:
+                write_rail_curvature(rails, p.strands, at)
     return rods.gap[0]
 
 
@@ -146,7 +188,14 @@ def add_rod_friction(rods, p, at, stage, with_hessian):
     """Friction at the contacts frozen last; returns infinity, as it knows no gap."""
     sums, energy, lost = p.sums, 0.0, 0.0
     if rods.sliding.count[0] > 0 and sums.selected[ROD_FRICTION]:
-        energy, lost = _add_friction(rods, stage, at.position, sums.contact_point)
+        rails = rods.rails
+        if not rails.exists:
+            energy, lost = _add_friction(rods, stage, at.position, stage.origin_position, sums.contact_point)
+        else:
+            rails.drag[:] = 0.0
+            write_rail_slips(rails, p.strands, stage, at)
+            energy, lost = _add_friction(rods, stage, rails.slip, rods.no_step, rails.drag)
+            hand_on(rails, p.strands, rails.drag, rails.slip_rate, sums.contact_point, sums.edge)
     sums.energy[ROD_FRICTION], sums.lost[ROD_FRICTION] = energy, lost
     return math.inf
 
@@ -213,12 +262,12 @@ def _moved(vectors, origin, contacts, c, m):
 
 
 @kernel
-def _add_friction(rods, stage, position, gradient):
+def _add_friction(rods, stage, position, origin, gradient):
     """Add the gradient of the dissipation potential of lagged contacts, write its second derivatives, and return it
     [J] and the power that is lost [W].
     """
     contacts, h, threshold, energy, lost = rods.sliding, stage.lengths[0], rods.threshold, 0.0, 0.0
-    origin, weight, normal, matrix = stage.origin_position, contacts.weight, contacts.normal, contacts.matrix
+    weight, normal, matrix = contacts.weight, contacts.normal, contacts.matrix
     slip = stack_vector(3)
     for c in range(contacts.count[0]):
         i, j = contacts.node[c, 0], contacts.node[c, 1]
@@ -249,15 +298,17 @@ def _add_friction(rods, stage, position, gradient):
 
 
 @kernel
-def rod_slip_along(rods, stage, position, node_step, begin, path_out):
+def rod_slip_along(rods, strands, stage, at, system, begin, path_out):
     """Write the slip path of every lagged contact in a Newton step (`forces.friction_limit`); a is along the slip.
 
     Parameters
     ----------
     rods : RodContact
+    strands : Strands
     stage : Stage
-    position, node_step : Array
-        Of nodes, and their displacement [m], shape (n_node, 3).
+    at : Configuration
+    system : System
+        With the step.
     begin : int
         Row of the first contact.
     path_out : Array
@@ -268,7 +319,12 @@ def rod_slip_along(rods, stage, position, node_step, begin, path_out):
     end : int
         Row after the last contact.
     """
-    contacts, origin, coefficient = rods.sliding, stage.origin_position, rods.coefficient
+    contacts, coefficient, rails = rods.sliding, rods.coefficient, rods.rails
+    position, origin, node_step = at.position, stage.origin_position, system.node_step
+    if rails.exists and contacts.count[0] > 0:
+        write_rail_slips(rails, strands, stage, at)
+        write_rail_motions(rails, strands, rails.slip_rate, system.node_step, system.angle_step, rails.node_motion)
+        position, origin, node_step = rails.slip, rods.no_step, rails.node_motion
     node, weight, normal = contacts.node, contacts.weight, contacts.normal
     slip, rate = stack_vector(3), stack_vector(3)
     for c in range(contacts.count[0]):

@@ -61,8 +61,9 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     placed, bodies = build_bodies(scene, found, plane)
     contact = build_contact(scene, found, placed, bodies.free_index, plane is not None)
     numbered = found.rods, found.node_count, found.edge_count, found.column("attached_node", np.int64)
-    layout = number_unknowns(*numbered)
-    solved = layout if plane is None else number_unknowns(*numbered, dimension=2)
+    rod_search, rod_point_weight, rails = build_rod_surfaces(scene, found)
+    layout = number_unknowns(*numbered, has_rails=rails.exists)
+    solved = layout if plane is None else number_unknowns(*numbered, dimension=2, has_rails=rails.exists)
     forces, rods = active_forces(scene, model, dimension), _rods(found, layout, solved, plane)
     constrained = _constrained(found, bodies.free_index, layout, solved)
     drives, bonds = _drives(found), _bonds(found, rods.bend_count)
@@ -70,7 +71,6 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     raised, number, kept_directors = build_raised(found, edges_of_loads(scene, found), scene.fluid is not None)
     flow, fluid = build_fluid(scene.fluid, found, rods.edge_node, raised, number)
     loads, followers, moments = build_loads(scene, found, placed.names, bodies.free_index, number)
-    rod_search, rod_point_weight = build_rod_surfaces(scene, found)
     strain_coupling = found.column("strain_coupling", width=2)
     built = Model(
         scene=scene,
@@ -97,6 +97,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         followers=followers,
         moments=moments,
         rod_search=rod_search,
+        rails=rails,
         **contact,
         bodies=placed,
         contact_stiffness=0.0 if scene.contact is None else scene.contact.stiffness,

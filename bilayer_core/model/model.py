@@ -8,7 +8,7 @@ import numpy as np
 
 from bilayer_core.contact.broad_phase import RodSearch
 from bilayer_core.model.free_motions import Mechanism, mechanisms_of
-from bilayer_core.model.records.contacts import Sliding, Surfaces
+from bilayer_core.model.records.contacts import Rails, Sliding, Surfaces
 from bilayer_core.model.records.light import Light
 from bilayer_core.model.records.parts import (
     Attachments,
@@ -91,6 +91,7 @@ class Model(ReadOnlyArrays):
     followers: PointForces  # along path, normal and path × normal of a rod, or in the axes of a body
     moments: Moments
     rod_search: RodSearch  # absent where no rod can meet another or itself
+    rails: Rails  # absent where rods meet about their nodes
 
     bodies: PlacedBodies
     contact_stiffness: float  # of the barrier, `contact.stiffness` or more [Pa]; 0 without contact

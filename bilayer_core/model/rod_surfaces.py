@@ -1,12 +1,13 @@
 """Rods as surfaces for each other: points on their edges, and which points see which edges.
 
-The points of an edge divide it evenly, its first node among them (and its last where a strand ends), no farther apart
-than the strand's radius: no other rod fits between them, whatever the mesh. A point stands for the length between the
+The points of an edge divide it evenly, or the segment between its rails (`contact.rails`), its first node among them
+(and its last where a strand ends), no farther apart than the strand's radius, half its thickness: no other rod fits
+between them, whatever the mesh. A point stands for the length between the
 middles to its neighbours, at the ends for half of it.
 
 A point sees edges of its own rod from the arc distance `rod_exclusion` on, all layers alike: the larger of `FEW_EDGES`
-edges and π/2 (H + d̂), with H the thickness of the rod, or twice the radius about its nodes where these are nearer to
-one face. A rod that met itself nearer than that would be bent more sharply than half of it.
+edges and π/2 (H + d̂), with H the thickness of the rod, or of a closed one twice the radius about its nodes where these
+are nearer to one face. A rod that met itself nearer than that would be bent more sharply than half of it.
 
 Edges that are copies (`model.strand_arrays`) have no points, and belong to one rod more that meets nothing.
 """
@@ -21,7 +22,9 @@ import numpy as np
 from bilayer_core.contact.broad_phase import RodSearch, near_pairs, tree_size
 from bilayer_core.errors import SceneError
 from bilayer_core.jit import UNALLOCATED
+from bilayer_core.model.records.contacts import Rails
 from bilayer_core.model.rod_pairs import rod_pairs
+from bilayer_core.model.rod_rails import build_rails, rail_heights, start_rails
 from bilayer_core.model.strand_arrays import StrandArrays
 from bilayer_core.model.strands import Collected
 from bilayer_core.model.validity import edge_figures
@@ -38,8 +41,9 @@ MOST_PAIRS = 10_000_000
 FEW_EDGES = 2  # that a point is away from the nearest edge of its own rod that it sees, at least
 
 
-def build_rod_surfaces(scene: SceneConfig, found: Collected) -> tuple[RodSearch, Array]:
-    """Return the search for rods that meet, absent if none can, and the length of rod that its points stand for [m].
+def build_rod_surfaces(scene: SceneConfig, found: Collected) -> tuple[RodSearch, Array, Rails]:
+    """Return the search for rods that meet, absent if none can, the length of rod that its points stand for [m], and
+    the rails along which they meet.
 
     Raises
     ------
@@ -48,7 +52,7 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> tuple[RodSearch,
     """
     decisions = [rod_pair for rod_pair in rod_pairs(scene) if rod_pair.active]
     if not decisions:
-        return RodSearch.absent(), np.zeros(0)
+        return RodSearch.absent(), np.zeros(0), Rails.absent()
     copies = [(index, copy) for index, rod in enumerate(scene.rods) for copy in rod.copies]
     scene_index = np.array([index for index, _ in copies])  # of each rod with copies
     rods, numbers = [copy.rod for _, copy in copies], {copy.name: number for number, (_, copy) in enumerate(copies)}
@@ -61,7 +65,9 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> tuple[RodSearch,
         can_collide[np.ix_(first, second)] |= meet
         can_collide[np.ix_(second, first)] |= meet.T
     joined = _joined(scene, rods)
-    node_radius, rest_length = found.column("node_radius"), found.column("rest_length")
+    rails, rest_length = build_rails(found), found.column("rest_length")
+    half = 0.5 * np.concatenate([strand.thickness for strand in found.strands])
+    node_radius = np.where(rail_heights(found) != 0.0, half, found.column("node_radius"))
     thickness = [float(edge_figures(scene, rod).thickness.max()) for rod in scene.rods]
     thickest = [thickness[index] for index in scene_index]
     for strand in found.strands:
@@ -113,7 +119,7 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> tuple[RodSearch,
     weight = arrays.pop("point_weight")
     search = RodSearch.zeros(
         UNALLOCATED,
-        start_position=found.column("position", width=3),
+        start_position=start_rails(found, rails),
         edge_node=found.column("edge_node", np.int64),
         **arrays,
         first_point=np.concatenate([[0], np.cumsum(counts)]),
@@ -122,7 +128,7 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> tuple[RodSearch,
         rod_exclusion=np.array(exclusion),
         rod_length=np.array([rod.path.length if rod.closed else math.inf for rod in rods] + [math.inf] * spare),
     )
-    return search, weight
+    return search, weight, rails
 
 
 def _too_thin(scene: SceneConfig, strand: StrandArrays, radius: float, total: float) -> SceneError:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from bilayer_core.model.force_list import on_nodes
 from bilayer_core.model.force_slots import NAMES
 from bilayer_core.model.model import Model
+from bilayer_core.model.unknown_order import OF_RAILS
 
 
 def sizes_of(model: Model) -> dict[str, int]:
@@ -34,6 +35,7 @@ def sizes_of(model: Model) -> dict[str, int]:
         "free": model.free_count,
         "body unknown": 6 * model.free_count,
         "dimension": layout.dimension,
+        "sides": 2 * (OF_RAILS[layout.dimension] + 1 if model.rails.exists else 2 * layout.dimension),
         "unknown": model.layout.size,
         "matrix unknown": layout.size,
         "row": layout.size + layout.half_bandwidth,

@@ -74,10 +74,11 @@ def surface_gaps(model: Model, within: float) -> Iterator[SurfaceGaps]:
 
 def rod_gaps(model: Model, within: float) -> RodGaps:
     """Return the places of rods that are nearer to each other than `within` [m]."""
-    rods, position = model.rod_search, model.start_position
+    rods = model.rod_search
     if not rods.exists:
         none, nowhere = np.zeros(0, dtype=np.int64), np.zeros(0)
         return RodGaps(none, none, nowhere, none, nowhere, nowhere)
+    position = rods.start_position
     pairs = NearPairs(rods)
     pairs.find(position, model.scene.contact.barrier_distance, within, most=MOST_SHOWN)
     point, edge = pairs.search.point[: pairs.count], pairs.search.edge[: pairs.count]

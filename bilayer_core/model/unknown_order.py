@@ -21,6 +21,8 @@ HALF_BANDWIDTH = {
     3: {1: 10, 2: 18},
     2: {1: 5, 2: 9},
 }  # by dimension and number of layers: (x θ x θ x) of one layer spans 11 unknowns, 19 with the other's between
+OF_RAILS = {3: 14, 2: 7}
+"""By dimension: the unknowns of an edge's rails (`contact.rails`), (x θ x θ x θ x) of one layer, span 15."""
 
 
 class ReadOnlyArrays:
@@ -92,10 +94,12 @@ def number_unknowns(
     edge_count: int,
     attached_node: np.ndarray,
     dimension: int = 3,
+    has_rails: bool = False,
 ) -> Layout:
     """Assign numbers to the unknowns of rods.
 
-    Each rod is a list of layers (first station, last station, first node, first edge).
+    Each rod is a list of layers (first station, last station, first node, first edge); with rails off the nodes, the
+    matrix couples those of two neighbours.
     """
     turns = dimension == 3
     node = np.full(node_count, -1, dtype=np.int64)
@@ -122,4 +126,6 @@ def number_unknowns(
         np.arange(len(attached)), dimension
     )
     half_bandwidth = HALF_BANDWIDTH[dimension][max(len(layers) for layers in rods)]
+    if has_rails:
+        half_bandwidth = max(half_bandwidth, OF_RAILS[dimension])
     return Layout(size, half_bandwidth, dimension, node, edge, attached, attached_of_unknown)

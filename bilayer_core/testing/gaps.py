@@ -72,7 +72,11 @@ class GapCheck:
         self._points = MeetingPoints(model)
         self._surfaces = surfaces_of(model, self._points)
         radius = self._points.node_radius
-        self._edge_radius = model.rod_search.edge_radius
+        self._start = self._points.middles(model.start_position, model.start_director1)
+        thickest = [
+            np.full(s.node_count - 1, radius[s.first_node : s.first_node + s.node_count].max()) for s in model.strands
+        ]
+        self._edge_radius = np.concatenate(thickest)
         self._fractions = fractions_of_points(model)
         self._smallest_radius = float(radius[model.node_length > 0.0].min())
         if self._pairs:
@@ -81,11 +85,11 @@ class GapCheck:
 
     def _leave_out_joined(self) -> None:
         """Leave out pairs of edges that touch at the start, of rods that one body holds side by side."""
-        rods, start = self._model.rod_search, self._model.start_position
+        rods, start = self._model.rod_search, self._start
         first, second = self._pairs.at(start)
         joined = rods.rod_joined[rods.edge_rod[first], rods.edge_rod[second]]
         gap, _ = self._rod_gaps(start)
-        self._pairs.leave_out(joined & (gap < self._model.scene.contact.barrier_distance))
+        self._pairs.leave_out(start, joined & (gap < self._model.scene.contact.barrier_distance))
 
     @property
     def checks_anything(self) -> bool:
@@ -99,9 +103,10 @@ class GapCheck:
             for position, quaternion in zip(frame.body_positions, frame.body_quaternions, strict=True)
         ]
         poses.append((np.zeros(3), np.eye(3)))  # the world
+        points = self._points.places(frame)
         return Moment(
-            frame.positions[: self._model.node_count],
-            self._points.places(frame),
+            points[: self._model.node_count],
+            points,
             np.array([poses[s.body][0] + poses[s.body][1] @ s.position for s in self._surfaces]).reshape(-1, 3),
             np.array([poses[s.body][1] @ s.rotation for s in self._surfaces]).reshape(-1, 3, 3),
         )
@@ -248,9 +253,9 @@ class PairsOfEdges:
         keep = ~np.isin(self._number(first, second), self._left_out)
         return first[keep], second[keep]
 
-    def leave_out(self, out: Array) -> None:
-        """Leave out pairs, of those at the start, from now on."""
-        first, second = self.at(self._model.start_position)
+    def leave_out(self, start: Array, out: Array) -> None:
+        """Leave out pairs, of those with nodes at the start [m], from now on."""
+        first, second = self.at(start)
         if self._all is not None:
             self._all = first[~out], second[~out]
         else:

@@ -59,15 +59,18 @@ class MeetingPoints:
         ).astype(np.int64)
         self.slot = np.concatenate([np.tile(np.arange(nodes), copies), shown, np.full(len(self._balls), -1)])
 
+    def middles(self, position: Array, directors: Array) -> Array:
+        """Middles of the sections of nodes [m], shape (n_node, 3)."""
+        return position + self._offset[:, None] * directors[self._model.surfaces.node_edges].mean(axis=1)
+
     def places(self, frame: Frame) -> Array:
         """Where they are [m], shape (n_point, 3)."""
         model, nodes = self._model, self._model.node_count
         position, edges = frame.positions[:nodes], model.surfaces.node_edges
         along = position[model.rods.edge_node + 1] - position[model.rods.edge_node]
         tangent = along / np.linalg.norm(along, axis=1)[:, None]
-        across = np.cross(tangent, frame.directors)
-        m1, m2 = frame.directors[edges].mean(axis=1), across[edges].mean(axis=1)
-        middle = position + self._offset[:, None] * m1
+        m2 = np.cross(tangent, frame.directors)[edges].mean(axis=1)
+        middle = self.middles(position, frame.directors)
         sections = [middle + side[:, None] * m2 for side in self._sides]
         return np.concatenate([*sections, frame.positions[nodes:], frame.body_positions[self._balls]])
 

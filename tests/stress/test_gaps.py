@@ -63,7 +63,7 @@ def test_near_pairs_of_very_many_edges_are_those_of_all(kind):
     assert expected and expected <= found
     assert len(found) < few.count < many.count
     start = model.start_position
-    many.leave_out(np.ones(len(many.at(start)[0]), dtype=bool))
+    many.leave_out(start, np.ones(len(many.at(start)[0]), dtype=bool))
     assert len(many.at(start)[0]) == 0
 
 

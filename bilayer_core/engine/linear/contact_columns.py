@@ -1,16 +1,22 @@
 """Contact between rods in the Newton matrix.
 
 A contact couples the edge (i, i+1) of a point with the edge (j, j+1) that it faces, which are far from each other in
-the band. The blocks of either edge by itself stay in the band. For those between the two, the columns of the nodes of
-one of them are moved to the border, as those of nodes that a free body holds are (`engine.linear.attachments`): with S
-the unknowns of these nodes and R all others,
+the band. What moves either *side* are the unknowns of the two nodes of its edge, and where these have rails
+(`contact.rails`) those of the nodes beside them and of three edges. With r the vector between the two places and M,
+κ and a as in `forces.rod_contact`, the contact adds
+
+    ∂rᵀ M ∂r − κ (|e| ∂t)ᵀ (|e| ∂t),    ∂r = Σ w_m ∂y_m,    |e| ∂t = Σ a_m·∂y_m
+
+of the four ends y_m. The blocks of either side by itself stay in the band, as does the curvature of arms. For those
+between the two, the columns of the unknowns of one of them are moved to the border, as those of nodes that a free body
+holds are (`engine.linear.attachments`): with S these unknowns and R all others,
 
     [ A_RR  A_RS ]        band: A_RR, rows of the identity for S
     [ A_SR  A_SS ]        border: U = A_RS,   corner: D = A_SS
 
-Of each two strands in contact the nodes that are fewer have such *contact columns*. So the border has three columns for
-each of some contacting nodes, and the cost stays linear in the number of nodes. Nodes where a closed rod closes have
-columns in the border anyhow (`engine.linear.closed_rods`).
+Of each two strands in contact the unknowns that are fewer have such *contact columns*. So the border has columns for
+some contacting nodes, and the cost stays linear in the number of nodes. Nodes where a closed rod closes have columns in
+the border anyhow (`engine.linear.closed_rods`).
 """
 
 from __future__ import annotations
@@ -19,92 +25,192 @@ from bilayer_core.engine.linear.assembly import hold_unknowns
 from bilayer_core.engine.linear.attachments import arm_jacobian
 from bilayer_core.engine.linear.new_columns import add_columns
 from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.stack import stack_matrix
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 
-CONTACTS, NODES = 0, 1
-"""Places in `ContactColumns.counts`."""
+CONTACTS, UNKNOWNS = 0, 1
+"""Places in `ContactColumns.counts`: contacts, and unknowns with columns."""
 
 
 @piece(int, Problem, int)
 def take_rod_contacts(p, simplified):
-    """Add each edge's own blocks to the band, and choose the nodes that have contact columns.
+    """Add each side's own blocks to the band, and choose the unknowns that have contact columns.
 
     `simplified` is 1 to leave out what is negative across the two edges, 2 to leave out all that is negative. Friction
     has nothing negative.
     """
     rods, columns = p.rod_contact, p.contact_columns
-    columns.counts[CONTACTS] = columns.counts[NODES] = 0
+    columns.counts[CONTACTS] = columns.counts[UNKNOWNS] = 0
     for part in range(2):
-        _list_contacts(columns, p.strands.axes, simplified, rods.contacts if part == 0 else rods.sliding)
+        rate = rods.rails.rate if part == 0 else rods.rails.slip_rate
+        _list_contacts(columns, rods.rails, rate, p.strands, simplified, rods.contacts if part == 0 else rods.sliding)
     if columns.counts[CONTACTS] > 0:
-        _add_own_edges(columns, p.strands.row, p.system.band)
-        _choose_nodes(columns, p.strands)
+        _add_own_sides(columns, p.system.band)
+        _choose_unknowns(columns)
+    if rods.rails.exists and rods.contacts.count[0] > 0:
+        _add_curvature(rods.rails, p.strands, p.system.band)
     return READY
 
 
 @kernel
-def _list_contacts(columns, axes, simplified, contacts):
-    """Append contacts to the list, with components along the unknowns of nodes."""
-    dimension, begin = axes.shape[0], columns.counts[CONTACTS]
-    normal, direction = contacts.normal, contacts.segment_direction
-    matrix, foot_gradient = contacts.matrix, contacts.foot_gradient
+def _list_contacts(columns, rails, rate, strands, simplified, contacts):
+    """Append contacts to the list, with what moves their sides."""
+    begin, half = columns.counts[CONTACTS], columns.unknown.shape[1] // 2
+    normal, direction, matrix = contacts.normal, contacts.segment_direction, stack_matrix(3, 3)
     for c in range(contacts.count[0]):
         e, tangential = begin + c, contacts.tangential_stiffness[c]
         columns.node[e, 0], columns.node[e, 1] = contacts.node[c, 0], contacts.node[c, 1]
         columns.stiffness[e] = tangential if contacts.inner[c] and simplified < 2 else 0.0
-        n0, n1, n2 = normal[c, 0], normal[c, 1], normal[c, 2]
-        u0, u1, u2 = direction[c, 0], direction[c, 1], direction[c, 2]
-        v0, v1, v2 = n1 * u2 - n2 * u1, n2 * u0 - n0 * u2, n0 * u1 - n1 * u0
-        for n in range(4):
-            columns.weight[e, n] = contacts.weight[c, n]
-        for a in range(dimension):
-            a0, a1, a2 = axes[a, 0], axes[a, 1], axes[a, 2]
-            for n in range(4):
-                along = a0 * foot_gradient[c, n, 0] + a1 * foot_gradient[c, n, 1] + a2 * foot_gradient[c, n, 2]
-                columns.foot_gradient[e, n, a] = along
-            m0 = a0 * matrix[c, 0, 0] + a1 * matrix[c, 1, 0] + a2 * matrix[c, 2, 0]
-            m1 = a0 * matrix[c, 0, 1] + a1 * matrix[c, 1, 1] + a2 * matrix[c, 2, 1]
-            m2 = a0 * matrix[c, 0, 2] + a1 * matrix[c, 1, 2] + a2 * matrix[c, 2, 2]
-            if simplified > 0:
-                part = tangential * (a0 * v0 + a1 * v1 + a2 * v2)
-                m0, m1, m2 = m0 - part * v0, m1 - part * v1, m2 - part * v2
+        for m in range(3):
+            for n in range(3):
+                matrix[m, n] = contacts.matrix[c, m, n]
+        if simplified > 0:
+            n0, n1, n2 = normal[c, 0], normal[c, 1], normal[c, 2]
+            u0, u1, u2 = direction[c, 0], direction[c, 1], direction[c, 2]
+            _subtract(matrix, tangential, n1 * u2 - n2 * u1, n2 * u0 - n0 * u2, n0 * u1 - n1 * u0)
             if simplified > 1:
-                part = tangential * (a0 * u0 + a1 * u1 + a2 * u2)
-                m0, m1, m2 = m0 - part * u0, m1 - part * u1, m2 - part * u2
-            for b in range(dimension):
-                columns.matrix[e, a, b] = m0 * axes[b, 0] + m1 * axes[b, 1] + m2 * axes[b, 2]
+                _subtract(matrix, tangential, u0, u1, u2)
+        for side in range(2):
+            if rails.exists:
+                _list_rails(columns, rails, rate, strands, contacts, c, e, side)
+            else:
+                _list_nodes(columns, strands, contacts, c, e, side)
+        for a in range(2 * half):
+            r0, r1, r2 = columns.rate[e, 0, a], columns.rate[e, 1, a], columns.rate[e, 2, a]
+            for m in range(3):
+                columns.pressed[e, m, a] = matrix[m, 0] * r0 + matrix[m, 1] * r1 + matrix[m, 2] * r2
     columns.counts[CONTACTS] = begin + contacts.count[0]
 
 
 @kernel
-def _block(columns, c, m, n, x, y):
-    """Entry of the second derivative of contact c by component x of its node m and y of its node n."""
-    weight, foot_gradient = columns.weight, columns.foot_gradient
-    value = weight[c, m] * weight[c, n] * columns.matrix[c, x, y]
-    return value - columns.stiffness[c] * foot_gradient[c, m, x] * foot_gradient[c, n, y]
+def _subtract(matrix, factor, v0, v1, v2):
+    """matrix −= factor v vᵀ"""
+    v = (v0, v1, v2)
+    for m in range(3):
+        for n in range(3):
+            matrix[m, n] -= factor * v[m] * v[n]
 
 
 @kernel
-def _add_own_edges(columns, node_row, band):
-    """Add the blocks of either edge of each contact by itself to the band."""
-    dimension = columns.matrix.shape[1]
+def _list_nodes(columns, strands, contacts, c, e, side):
+    """List the unknowns of the nodes of one side, and what moves with them."""
+    axes, dimension = strands.axes, strands.axes.shape[0]
+    for m in range(2):
+        weight, node = contacts.weight[c, 2 * side + m], contacts.node[c, side] + m
+        for x in range(dimension):
+            a, along = dimension * (2 * side + m) + x, 0.0
+            columns.unknown[e, a] = strands.row[node] + x
+            for n in range(3):
+                columns.rate[e, n, a] = weight * axes[x, n]
+                along += contacts.foot_gradient[c, 2 * side + m, n] * axes[x, n]
+            columns.foot[e, a] = along
+
+
+@kernel
+def _list_rails(columns, rails, rate, strands, contacts, c, e, side):
+    """List the unknowns that move the rails of one side: of the nodes before, at and after its edge and of the edges
+    between these, in that order.
+    """
+    axes, dimension, first = strands.axes, strands.axes.shape[0], contacts.node[c, side]
+    begin = side * (columns.unknown.shape[1] // 2)
+    turns = begin + 4 * dimension
+    own, before = rails.node_edges[first, 1], rails.node_edges[first, 0]
+    after = rails.node_edges[first + 1, 1]
+    raised = rails.height[first] != 0.0 or rails.height[first + 1] != 0.0
+    for k in range(4):
+        row = strands.row[first + k - 1] if 0 < k < 3 else -1
+        if k == 0 and raised and before != own:
+            row = strands.row[strands.edge_node[before]]
+        if k == 3 and raised and after != own:
+            row = strands.row[strands.edge_node[after] + 1]
+        for x in range(dimension):
+            columns.unknown[e, begin + dimension * k + x] = row + x if row >= 0 else -1
+    if dimension == 3:
+        columns.unknown[e, turns] = strands.edge_unknown[before] if raised and before != own else -1
+        columns.unknown[e, turns + 1] = strands.edge_unknown[own] if raised else -1
+        columns.unknown[e, turns + 2] = strands.edge_unknown[after] if raised and after != own else -1
+    for a in range(begin, begin + columns.unknown.shape[1] // 2):
+        columns.rate[e, 0, a] = columns.rate[e, 1, a] = columns.rate[e, 2, a] = columns.foot[e, a] = 0.0
+    for m in range(2):
+        leg, node = 2 * side + m, first + m
+        weight, foot = contacts.weight[c, leg], contacts.foot_gradient
+        for x in range(dimension):
+            for n in range(3):
+                back = front = 0.0
+                if rails.height[node] != 0.0:
+                    for d in range(3):
+                        back += rate[node, n, d] * axes[x, d]
+                        front += rate[node, n, 4 + d] * axes[x, d]
+                for k in range(3):
+                    moved = -back if k == 0 else front if k == 2 else axes[x, n] + back - front
+                    a = begin + dimension * (m + k) + x
+                    columns.rate[e, n, a] += weight * moved
+                    columns.foot[e, a] += foot[c, leg, n] * moved
+        if dimension == 3 and rails.height[node] != 0.0:
+            for k in range(2):
+                for n in range(3):
+                    columns.rate[e, n, turns + m + k] += weight * rate[node, n, 3 + 4 * k]
+                    columns.foot[e, turns + m + k] += foot[c, leg, n] * rate[node, n, 3 + 4 * k]
+
+
+@kernel
+def _entry(columns, c, a, b):
+    """Entry of the second derivative of contact c by its unknowns a and b."""
+    rate, pressed = columns.rate, columns.pressed
+    value = rate[c, 0, a] * pressed[c, 0, b] + rate[c, 1, a] * pressed[c, 1, b] + rate[c, 2, a] * pressed[c, 2, b]
+    return value - columns.stiffness[c] * columns.foot[c, a] * columns.foot[c, b]
+
+
+@kernel
+def _add_own_sides(columns, band):
+    """Add the blocks of either side of each contact by itself to the band."""
+    half = columns.unknown.shape[1] // 2
     for c in range(columns.counts[CONTACTS]):
-        for block in range(6):  # of the first and second edge: (0, 0), (1, 0), (1, 1)
-            edge, m, n = block // 3, (block % 3 + 1) // 2, block % 3 // 2
-            first = columns.node[c, edge]
-            row, column = node_row[first + m], node_row[first + n]
-            for x in range(dimension):
-                for y in range(x + 1 if m == n else dimension):
-                    band[column + y, row + x - column - y] += _block(columns, c, 2 * edge + m, 2 * edge + n, x, y)
+        for side in range(2):
+            for a in range(side * half, (side + 1) * half):
+                row = columns.unknown[c, a]
+                if row < 0:
+                    continue
+                for b in range(side * half, a + 1):
+                    column = columns.unknown[c, b]
+                    if column >= 0:
+                        band[min(row, column), abs(row - column)] += _entry(columns, c, a, b)
 
 
 @kernel
-def _choose_nodes(columns, strands):
-    """Give contact columns to the smaller set of nodes of each two strands in contact (or halves of one)."""
-    count, dimension, row = columns.counts[CONTACTS], strands.dimension, strands.row
-    node, strand, attached, mark, met = columns.node, columns.strand, columns.attached, columns.mark, columns.met
-    joined = columns.joined
+def _add_curvature(rails, strands, band):
+    """Add the second derivatives of arms by their edges to the band."""
+    axes, dimension, block = strands.axes, strands.axes.shape[0], rails.curvature
+    for e in range(block.shape[0]):
+        i = strands.edge_node[e]
+        if rails.height[i] == 0.0 and rails.height[i + 1] == 0.0:
+            continue
+        first, last = strands.row[i], strands.row[i + 1]
+        for x in range(dimension):
+            for y in range(dimension):
+                value = 0.0
+                for m in range(3):
+                    for n in range(3):
+                        value += axes[x, m] * block[e, m, n] * axes[y, n]
+                if y <= x:
+                    band[first + y, x - y] += value
+                    band[last + y, x - y] += value
+                band[first + y, last + x - first - y] -= value
+            if dimension == 3:
+                turn = strands.edge_unknown[e]
+                value = axes[x, 0] * block[e, 0, 3] + axes[x, 1] * block[e, 1, 3] + axes[x, 2] * block[e, 2, 3]
+                band[min(first + x, turn), abs(turn - first - x)] -= value
+                band[min(last + x, turn), abs(turn - last - x)] += value
+        if dimension == 3:
+            band[strands.edge_unknown[e], 0] += block[e, 3, 3]
+
+
+@kernel
+def _choose_unknowns(columns):
+    """Give contact columns to the smaller set of unknowns of each two strands in contact (or halves of one)."""
+    count, node, strand, mark, met = columns.counts[CONTACTS], columns.node, columns.strand, columns.mark, columns.met
+    half = columns.unknown.shape[1] // 2
     mark[:] = -1
     met[:] = 0
     columns.column[:] = -1
@@ -119,12 +225,11 @@ def _choose_nodes(columns, strands):
             low, high = min(node[e, 0], node[e, 1]), max(node[e, 0], node[e, 1])
             if strand[low] != s or strand[high] != t:
                 continue
-            for i in range(low, low + 2):
-                for j in range(high, high + 2):
-                    if attached[i] < 0 and attached[j] < 0 and not joined[i] and not joined[j]:
-                        lower += mark[i, 0] != c
-                        upper += mark[j, 1] != c
-                        mark[i, 0] = mark[j, 1] = c
+            low_side = 0 if node[e, 0] <= node[e, 1] else 1
+            if not (_has_free(columns, e, 0, half) and _has_free(columns, e, half, 2 * half)):
+                continue
+            lower += _mark_side(columns, e, low_side * half, half, 0, c)
+            upper += _mark_side(columns, e, (1 - low_side) * half, half, 1, c)
         fewer = 0 if lower <= upper else 1
         for i in range(mark.shape[0]):
             if mark[i, fewer] == c:
@@ -132,65 +237,94 @@ def _choose_nodes(columns, strands):
     chosen = 0
     for i in range(mark.shape[0]):
         if mark[i, 2] == 1:
-            for x in range(dimension):
-                columns.column[row[i] + x] = dimension * chosen + x
-            columns.row[chosen] = row[i]
+            columns.column[i] = chosen
+            columns.row[chosen] = i
             chosen += 1
-    columns.counts[NODES] = chosen
+    columns.counts[UNKNOWNS] = chosen
+
+
+@kernel
+def _is_free(columns, row):
+    """Return whether an unknown is in the band and in no border yet."""
+    return row >= 0 and columns.attached[row] < 0 and not columns.joined[row]
+
+
+@kernel
+def _has_free(columns, e, begin, end):
+    """Return whether any of a contact's unknowns from `begin` to `end` is free."""
+    for a in range(begin, end):
+        if _is_free(columns, columns.unknown[e, a]):
+            return True
+    return False
+
+
+@kernel
+def _mark_side(columns, e, begin, half, which, c):
+    """Mark the free unknowns of a side with c; return how many were not."""
+    mark, new = columns.mark, 0
+    for a in range(begin, begin + half):
+        row = columns.unknown[e, a]
+        if _is_free(columns, row) and mark[row, which] != c:
+            mark[row, which] = c
+            new += 1
+    return new
 
 
 @kernel
 def condense_contacts_to_bodies(columns, attachments, strands, at, border):
-    """Add the blocks between the edges of contacts, of nodes that free bodies hold, to these bodies' border and corner;
+    """Add the blocks between the sides of contacts, of nodes that free bodies hold, to these bodies' border and corner;
     see `engine.linear.attachments`.
     """
     if not columns.exists:
         return
     axes, arm, attached, free = strands.axes, at.arm, columns.attached, attachments.free
+    half = columns.unknown.shape[1] // 2
     for c in range(columns.counts[CONTACTS]):
-        for pair in range(4):
-            m, n = pair // 2, pair % 2
-            i, j = columns.node[c, 0] + m, columns.node[c, 1] + n
-            first, second = attached[i], attached[j]
+        for a in range(half):
+            i = columns.unknown[c, a]
+            first = attached[i] if i >= 0 else -1
             f = free[first] if first >= 0 else -1
-            g = free[second] if second >= 0 else -1
-            if f < 0 and g < 0:
-                continue
-            for x in range(axes.shape[0]):
-                for y in range(axes.shape[0]):
-                    value = _block(columns, c, m, 2 + n, x, y)
-                    if f >= 0 and g >= 0:
-                        for k in range(6):
-                            for q in range(6):
-                                turned = arm_jacobian(axes, arm, first, x, k) * value
-                                turned *= arm_jacobian(axes, arm, second, y, q)
-                                border.corner[6 * f + k, 6 * g + q] += turned
-                                border.corner[6 * g + q, 6 * f + k] += turned
-                    elif f >= 0 and second < 0:
-                        for k in range(6):
+            for b in range(half, 2 * half):
+                j = columns.unknown[c, b]
+                if i < 0 or j < 0:
+                    continue
+                second = attached[j]
+                g = free[second] if second >= 0 else -1
+                if f < 0 and g < 0:
+                    continue
+                value = _entry(columns, c, a, b)
+                x = i - attachments.unknown[first] if f >= 0 else 0
+                y = j - attachments.unknown[second] if g >= 0 else 0
+                if f >= 0 and g >= 0:
+                    for k in range(6):
+                        for q in range(6):
                             turned = arm_jacobian(axes, arm, first, x, k) * value
-                            border.border[strands.row[j] + y, 6 * f + k] += turned
-                    elif g >= 0 and first < 0:
-                        for k in range(6):
-                            turned = arm_jacobian(axes, arm, second, y, k) * value
-                            border.border[strands.row[i] + x, 6 * g + k] += turned
+                            turned *= arm_jacobian(axes, arm, second, y, q)
+                            border.corner[6 * f + k, 6 * g + q] += turned
+                            border.corner[6 * g + q, 6 * f + k] += turned
+                elif f >= 0 and second < 0:
+                    for k in range(6):
+                        border.border[j, 6 * f + k] += arm_jacobian(axes, arm, first, x, k) * value
+                elif g >= 0 and first < 0:
+                    for k in range(6):
+                        border.border[i, 6 * g + k] += arm_jacobian(axes, arm, second, y, k) * value
 
 
 @piece(bool, Problem)
 def move_to_border(p):
-    """Move contact columns from the band to the border, and add to them what is between the edges of contacts; false if
+    """Move contact columns from the band to the border, and add to them what is between the sides of contacts; false if
     there is no capacity for them, but `BorderedSystem.width` is what it would be.
     """
     columns, bordered, strands = p.contact_columns, p.bordered, p.strands
-    nodes, base = columns.counts[NODES], bordered.width[0]
-    if columns.counts[CONTACTS] == 0 or (nodes == 0 and not p.joins.exists):
+    count, base = columns.counts[UNKNOWNS], bordered.width[0]
+    if columns.counts[CONTACTS] == 0 or (count == 0 and not p.joins.exists):
         return True
-    if base + strands.dimension * nodes > bordered.load.shape[0]:
-        bordered.width[0] = base + strands.dimension * nodes
+    if base + count > bordered.load.shape[0]:
+        bordered.width[0] = base + count
         return False
-    add_columns(bordered, strands.dimension * nodes)
+    add_columns(bordered, count)
     _move_from_band(columns, bordered, strands, base, p.system.band)
-    _add_between(columns, p.joins, p.bodies.freedom, bordered, strands.row, base)
+    _add_between(columns, p.joins, p.bodies.freedom, bordered, base)
     return True
 
 
@@ -198,20 +332,19 @@ def move_to_border(p):
 def _move_from_band(columns, bordered, strands, base, band):
     """Move contact columns to the border and corner, those from `base` on; the band keeps those of the identity."""
     border, corner, slot = bordered.border, bordered.schur, columns.column
-    bandwidth, nodes = strands.bandwidth, columns.counts[NODES]
-    for k in range(nodes):
-        for column in range(columns.row[k], columns.row[k] + strands.dimension):
-            own = base + slot[column]
-            for c in range(base):
-                corner[c, own] = corner[own, c] = border[c, column]
-                border[c, column] = 0.0
-            for i in range(max(0, column - bandwidth), min(strands.size, column + bandwidth + 1)):
-                value = band[column, i - column] if i >= column else band[i, column - i]
-                if slot[i] >= 0:
-                    corner[base + slot[i], own] = value
-                else:
-                    border[own, i] = value
-    hold_unknowns(columns.row[:nodes], strands.dimension, bandwidth, band)
+    bandwidth, count = strands.bandwidth, columns.counts[UNKNOWNS]
+    for k in range(count):
+        column, own = columns.row[k], base + k
+        for c in range(base):
+            corner[c, own] = corner[own, c] = border[c, column]
+            border[c, column] = 0.0
+        for i in range(max(0, column - bandwidth), min(strands.size, column + bandwidth + 1)):
+            value = band[column, i - column] if i >= column else band[i, column - i]
+            if slot[i] >= 0:
+                corner[base + slot[i], own] = value
+            else:
+                border[own, i] = value
+    hold_unknowns(columns.row[:count], 1, bandwidth, band)
 
 
 @kernel
@@ -223,51 +356,45 @@ def _column(columns, joins, freedom, base, row):
 
 
 @kernel
-def _add_between(columns, joins, freedom, bordered, node_row, base):
-    """Add the blocks between the edges of contacts, of nodes that no body holds; one node of each has columns."""
-    dimension, attached = columns.matrix.shape[1], columns.attached
+def _add_between(columns, joins, freedom, bordered, base):
+    """Add the blocks between the sides of contacts, of nodes that no body holds; one side of each has columns."""
+    attached, half = columns.attached, columns.unknown.shape[1] // 2
     for c in range(columns.counts[CONTACTS]):
-        for pair in range(4):
-            m, n = pair // 2, pair % 2
-            i, j = columns.node[c, 0] + m, columns.node[c, 1] + n
-            if attached[i] >= 0 or attached[j] >= 0:
+        for a in range(half):
+            row = columns.unknown[c, a]
+            if row < 0 or attached[row] >= 0:
                 continue
-            for x in range(dimension):
-                for y in range(dimension):
-                    row, column = node_row[i] + x, node_row[j] + y
-                    a = _column(columns, joins, freedom, base, row)
-                    b = _column(columns, joins, freedom, base, column)
-                    value = _block(columns, c, m, 2 + n, x, y)
-                    if a >= 0 and b >= 0:
-                        bordered.schur[a, b] += value
-                        bordered.schur[b, a] += value
-                    elif a >= 0:
-                        bordered.border[a, column] += value
-                    else:
-                        bordered.border[b, row] += value
+            own = _column(columns, joins, freedom, base, row)
+            for b in range(half, 2 * half):
+                column = columns.unknown[c, b]
+                if column < 0 or attached[column] >= 0:
+                    continue
+                other, value = _column(columns, joins, freedom, base, column), _entry(columns, c, a, b)
+                if own >= 0 and other >= 0:
+                    bordered.schur[own, other] += value
+                    bordered.schur[other, own] += value
+                elif own >= 0:
+                    bordered.border[own, column] += value
+                else:
+                    bordered.border[other, row] += value
 
 
 @kernel
 def gather_columns(columns, bordered, right):
-    """Move what is wanted of nodes with contact columns from the right-hand side to `BorderedSystem.load`."""
+    """Move what is wanted of unknowns with contact columns from the right-hand side to `BorderedSystem.load`."""
     if not columns.exists:
         return
-    dimension, nodes = columns.matrix.shape[1], columns.counts[NODES]
-    base = bordered.width[0] - dimension * nodes
-    for k in range(nodes):
-        for c in range(dimension):
-            row = columns.row[k] + c
-            bordered.load[base + dimension * k + c] = right[row]
-            right[row] = 0.0
+    base = bordered.width[0] - columns.counts[UNKNOWNS]
+    for k in range(columns.counts[UNKNOWNS]):
+        bordered.load[base + k] = right[columns.row[k]]
+        right[columns.row[k]] = 0.0
 
 
 @kernel
 def scatter_columns(columns, bordered, right):
-    """Move the step of nodes with contact columns from `BorderedSystem.load` to that of all."""
+    """Move the step of unknowns with contact columns from `BorderedSystem.load` to that of all."""
     if not columns.exists:
         return
-    dimension, nodes = columns.matrix.shape[1], columns.counts[NODES]
-    base = bordered.width[0] - dimension * nodes
-    for k in range(nodes):
-        for c in range(dimension):
-            right[columns.row[k] + c] = bordered.load[base + dimension * k + c]
+    base = bordered.width[0] - columns.counts[UNKNOWNS]
+    for k in range(columns.counts[UNKNOWNS]):
+        right[columns.row[k]] = bordered.load[base + k]

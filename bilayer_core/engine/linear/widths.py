@@ -59,8 +59,10 @@ def _set(factorises, goes_forward, goes_backward, eliminates, suffix: str) -> tu
 SETS: dict[int, tuple[Piece, ...]] = {}
 """The pieces of each half-bandwidth."""
 factor_5, forward_5, backward_5, eliminate_5 = SETS[5] = _of_width(5)
+factor_7, forward_7, backward_7, eliminate_7 = SETS[7] = _of_width(7)
 factor_9, forward_9, backward_9, eliminate_9 = SETS[9] = _of_width(9)
 factor_10, forward_10, backward_10, eliminate_10 = SETS[10] = _of_width(10)
+factor_14, forward_14, backward_14, eliminate_14 = SETS[14] = _of_width(14)
 factor_18, forward_18, backward_18, eliminate_18 = SETS[18] = _of_width(18)
 
 
@@ -70,10 +72,14 @@ def factorise_band(band, n, counts):
     b = band.shape[1] - 1
     if b == 5:
         return factor_5(band, n, counts)
+    if b == 7:
+        return factor_7(band, n, counts)
     if b == 9:
         return factor_9(band, n, counts)
     if b == 10:
         return factor_10(band, n, counts)
+    if b == 14:
+        return factor_14(band, n, counts)
     if b == 18:
         return factor_18(band, n, counts)
     return 0  # no width of a model: as if the first pivot were not positive
@@ -85,10 +91,14 @@ def go_forward(band, n, right):
     b = band.shape[1] - 1
     if b == 5:
         return forward_5(band, n, right)
+    if b == 7:
+        return forward_7(band, n, right)
     if b == 9:
         return forward_9(band, n, right)
     if b == 10:
         return forward_10(band, n, right)
+    if b == 14:
+        return forward_14(band, n, right)
     return forward_18(band, n, right)
 
 
@@ -98,10 +108,14 @@ def go_backward(band, n, right):
     b = band.shape[1] - 1
     if b == 5:
         return backward_5(band, n, right)
+    if b == 7:
+        return backward_7(band, n, right)
     if b == 9:
         return backward_9(band, n, right)
     if b == 10:
         return backward_10(band, n, right)
+    if b == 14:
+        return backward_14(band, n, right)
     return backward_18(band, n, right)
 
 
@@ -111,8 +125,12 @@ def eliminate(band, n, bordered):
     b = band.shape[1] - 1
     if b == 5:
         return eliminate_5(band, n, bordered)
+    if b == 7:
+        return eliminate_7(band, n, bordered)
     if b == 9:
         return eliminate_9(band, n, bordered)
     if b == 10:
         return eliminate_10(band, n, bordered)
+    if b == 14:
+        return eliminate_14(band, n, bordered)
     return eliminate_18(band, n, bordered)

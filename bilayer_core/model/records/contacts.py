@@ -156,6 +156,26 @@ class RodContactList:
 
 
 @record
+class Rails:
+    """Middles between the faces of rods off their curves, and how they move; see `contact.rails`."""
+
+    height: Vector  # over the nodes [m], shape (n_node,)
+    node_edges: IndexTable  # before and after each node, the same at an end, shape (n_node, 2)
+    factor: float  # how many times farther than nodes, and borders of edges by a turn, rails move at most
+    place: Matrix = ("node", 3)  # [m]
+    rate: Stack = ("node", 3, 8)  # by the edges at each node, see `forces.rail_arms`
+    gradient: Matrix = ("node", 3)  # of the barrier at the contacts found last [N]
+    curvature: Stack = ("edge", 4, 4)  # what its second derivative has of arms
+    slip_rate: Stack = ("node", 3, 8)  # rates frozen for friction
+    drag: Matrix = ("node", 3)  # gradient of friction [N]
+    slip: Matrix = ("node", 3)  # since the origin of a stage [m]
+    node_motion: Matrix = ("node", 3)  # scratch
+    turn: Vector = ("edge",)  # scratch
+    swing: Vector = ("node",)  # in a step beyond the motion of their nodes, at most [m]
+    step: Matrix = ("node", 3)  # mean motion in a step [m]
+
+
+@record
 class RodContact:
     """Rods that can meet: the search for near pairs, and contacts; see `contact.rod_list`."""
 
@@ -166,8 +186,9 @@ class RodContact:
     threshold: float
     unit: float  # barrier distance and thickest layer together
     point_weight: Vector
+    rails: Rails
     search: RodSearch
-    last: Matrix = ("node", 3)  # where nodes were last, their mean taken off [m]
+    last: Matrix = ("node", 3)  # where rails were last, their mean taken off [m]
     ways: Vector  # of the list; see `contact.rod_list`, shape (4,)
     no_step: Matrix = ("node", 3)  # zeros
     gap: Vector = (1,)  # the smallest below the barrier distance
@@ -181,14 +202,15 @@ class ContactColumns:
 
     counts: Indices = (2,)  # of contacts and of nodes
     node: IndexTable = ("contact", 2)  # of contacts of barrier and friction in one list
-    weight: Matrix = ("contact", 4)
-    matrix: Stack = ("contact", "dimension", "dimension")  # M along the unknowns of nodes
+    unknown: IndexTable = ("contact", "sides")  # that move the two sides, −1 for none
+    rate: Stack = ("contact", 3, "sides")  # ∂r of each by these
+    pressed: Stack = ("contact", 3, "sides")  # M ∂r
     stiffness: Vector = ("contact",)  # κ, 0 where the nearest point is a node
-    foot_gradient: Stack = ("contact", 4, "dimension")  # a_m along the unknowns of nodes
+    foot: Matrix = ("contact", "sides")  # |e| ∂t
     strand: Indices  # of each node
-    attached: Indices  # index of each node among those that bodies hold, which are in the border already, or −1
-    joined: Flags  # whether a node is in the border because a rod closes there
-    mark: IndexTable = ("node", 3)  # scratch
+    attached: Indices  # index among held nodes of each unknown, which are in the border already, or −1
+    joined: Flags  # whether an unknown is in the border because a rod closes there
+    mark: IndexTable = ("matrix unknown", 3)  # scratch
     met: IndexTable = ("strand", "strand")  # scratch
-    row: Indices = ("node",)  # in the band, of each node that has columns, ascending
+    row: Indices = ("matrix unknown",)  # in the band, of each unknown that has a column, ascending
     column: Indices = ("matrix unknown",)  # of each unknown among the contact columns, −1 without one

@@ -1,0 +1,110 @@
+"""Where rods meet other rods: along *rails*, in the middle between their faces.
+
+The curve of a rod lies on its neutral axis; where layers differ that is not the middle of its section, which is at the
+height h over it. The rail of a node i is at
+
+    y_i = x_i + h_i · mean of m1 over the edges before and after
+
+(at an end the one edge), and a rod meets others with the chain of segments between its rails, half its thickness away
+from it: with either face where the face is. Without a height the rails are the nodes.
+
+**In a step** an edge e with the ends' step δe turns its frame by |ω| ≤ 1.3 |ṫ| + |δθ| (`contact.step_bound`), and |ṫ| ≤
+σ/(1 − α σ) with σ = |δe|/|e| over the part α of the step. So the rail goes no farther than its node by α times its
+*swing*, h |ω|; α is at most 1/(2 σ) of any edge with a height.
+"""
+
+from __future__ import annotations
+
+import math
+
+from bilayer_core.jit import kernel
+from bilayer_core.kinematics.vector import cross, dot, row
+
+LARGEST_SLOPE = 0.5
+"""Of α σ."""
+
+
+@kernel
+def place_rails(rails, at):
+    """Write the positions of rails [m], shape (n_node, 3)."""
+    place, edges, m1 = rails.place, rails.node_edges, at.director1
+    for i in range(place.shape[0]):
+        half = 0.5 * rails.height[i]
+        for c in range(3):
+            place[i, c] = at.position[i, c] + half * (m1[edges[i, 0], c] + m1[edges[i, 1], c])
+
+
+@kernel
+def _slope(strands, system, at, e):
+    """σ of an edge."""
+    n, step, square = strands.edge_node[e], system.node_step, 0.0
+    for c in range(3):
+        square += (step[n + 1, c] - step[n, c]) ** 2
+    return math.sqrt(square) / at.length[e]
+
+
+@kernel
+def most_of_turn(rails, strands, system, at):
+    """Return the largest part of a step over which the bounds of turning hold."""
+    steepest = 0.0
+    for i in range(rails.height.shape[0]):
+        if rails.height[i] != 0.0:
+            for side in range(2):
+                steepest = max(steepest, _slope(strands, system, at, rails.node_edges[i, side]))
+    return LARGEST_SLOPE / steepest if steepest > LARGEST_SLOPE else 1.0
+
+
+@kernel
+def write_swings(rails, strands, system, at, part):
+    """Write the swing of each rail in a part of a step [m]; return the largest."""
+    largest = 0.0
+    for i in range(rails.height.shape[0]):
+        turn = 0.0
+        if rails.height[i] != 0.0:
+            for side in range(2):
+                e = rails.node_edges[i, side]
+                slope = _slope(strands, system, at, e)
+                turn = max(turn, 1.3 * slope / (1.0 - part * slope) + abs(system.angle_step[e]))
+        rails.swing[i] = abs(rails.height[i]) * turn
+        largest = max(largest, rails.swing[i])
+    return largest
+
+
+@kernel
+def rail_in_step(rails, strands, system, at, i, part):
+    """Return where a rail is by a part of a step, as a tuple: directors go with the tangents of their edges by parallel
+    transport, and turn about them.
+    """
+    step = system.node_step
+    y0 = at.position[i, 0] + part * step[i, 0]
+    y1 = at.position[i, 1] + part * step[i, 1]
+    y2 = at.position[i, 2] + part * step[i, 2]
+    half = 0.5 * rails.height[i]
+    if half == 0.0:
+        return y0, y1, y2
+    for side in range(2):
+        e = rails.node_edges[i, side]
+        n, t, m, length = strands.edge_node[e], row(at.tangent, e), row(at.director1, e), at.length[e]
+        u0 = length * t[0] + part * (step[n + 1, 0] - step[n, 0])
+        u1 = length * t[1] + part * (step[n + 1, 1] - step[n, 1])
+        u2 = length * t[2] + part * (step[n + 1, 2] - step[n, 2])
+        size = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2)
+        u = u0 / size, u1 / size, u2 / size
+        scale = dot(m, u) / (1.0 + dot(t, u))
+        m = m[0] - scale * (t[0] + u[0]), m[1] - scale * (t[1] + u[1]), m[2] - scale * (t[2] + u[2])
+        angle = part * system.angle_step[e]
+        cosine, sine, other = half * math.cos(angle), half * math.sin(angle), cross(u, m)
+        y0 += cosine * m[0] + sine * other[0]
+        y1 += cosine * m[1] + sine * other[1]
+        y2 += cosine * m[2] + sine * other[2]
+    return y0, y1, y2
+
+
+@kernel
+def write_rail_steps(rails, strands, system, at, part):
+    """Write the mean rate of rails over a part of a step, in units of the step [m]; `place` is up to date."""
+    for i in range(rails.height.shape[0]):
+        y0, y1, y2 = rail_in_step(rails, strands, system, at, i, part)
+        rails.step[i, 0] = (y0 - rails.place[i, 0]) / part
+        rails.step[i, 1] = (y1 - rails.place[i, 1]) / part
+        rails.step[i, 2] = (y2 - rails.place[i, 2]) / part

@@ -1,0 +1,137 @@
+"""Derivatives of rails (`contact.rails`) by the edges at their nodes.
+
+The arm of a rail is the mean of A = h m1 over the edges before and after its node (at an end there is one edge, alone).
+An increment (ε, θ) of an edge of length l with the tangent t moves A, by the parallel transport and turn of
+`forces.bend_twist`, at first order with the *rate*
+
+    ∂A/∂ε = −t Aᵀ/l,   ∂A/∂θ = t × A = h m2
+
+and for a gradient g at second order by ½ of the quadratic form
+
+    ∂²(g·A)/∂ε²  = [(g·t)(A tᵀ + t Aᵀ) − ½ (A g⊥ᵀ + g⊥ Aᵀ)]/l²,   g⊥ = g − (g·t) t
+    ∂²(g·A)/∂ε∂θ = −(g·t) t × A/l,   ∂²(g·A)/∂θ² = −g·A
+
+A gradient g at a rail is g at its node and gᵀ ∂A/∂(ε, θ) at the edges. Rates have four columns of the edge before, then
+four of that after.
+"""
+
+from __future__ import annotations
+
+from bilayer_core.jit import kernel
+from bilayer_core.kinematics.vector import cross, dot, row
+
+
+@kernel
+def _share(rails, i):
+    """Return the part that each edge at a node has in the arm, and the number of these edges."""
+    return (1.0, 1) if rails.node_edges[i, 0] == rails.node_edges[i, 1] else (0.5, 2)
+
+
+@kernel
+def _first(strands, i, e):
+    """First column of an edge in the rate of a rail."""
+    return 4 if strands.edge_node[e] == i else 0
+
+
+@kernel
+def write_rail_rates(rails, strands, at, rate_out):
+    """Write the rates of all rails with a height, shape (n_node, 3, 8)."""
+    for i in range(rails.height.shape[0]):
+        if rails.height[i] == 0.0:
+            continue
+        rate_out[i] = 0.0
+        share, count = _share(rails, i)
+        share *= rails.height[i]
+        for side in range(count):
+            e = rails.node_edges[i, side]
+            first, t, m, length = _first(strands, i, e), row(at.tangent, e), row(at.director1, e), at.length[e]
+            turned = cross(t, m)
+            for c in range(3):
+                for d in range(3):
+                    rate_out[i, c, first + d] = -share * t[c] * m[d] / length
+                rate_out[i, c, first + 3] = share * turned[c]
+
+
+@kernel
+def hand_on(rails, strands, gradient, rate, node_out, edge_out):
+    """Add a gradient by rails to those by nodes and edges."""
+    for i in range(rails.height.shape[0]):
+        g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
+        if g0 == 0.0 and g1 == 0.0 and g2 == 0.0:
+            continue
+        node_out[i, 0] += g0
+        node_out[i, 1] += g1
+        node_out[i, 2] += g2
+        if rails.height[i] == 0.0:
+            continue
+        _, count = _share(rails, i)
+        for side in range(count):
+            e = rails.node_edges[i, side]
+            first = _first(strands, i, e)
+            for n in range(4):
+                edge_out[e, n] += g0 * rate[i, 0, first + n] + g1 * rate[i, 1, first + n] + g2 * rate[i, 2, first + n]
+
+
+@kernel
+def arm_motion(rails, strands, rate, node_vectors, angles, i, c):
+    """Component c of what the arm of a rail with a height moves by, at first order, with its nodes and edges."""
+    moved = 0.0
+    _, count = _share(rails, i)
+    for side in range(count):
+        e = rails.node_edges[i, side]
+        first, n = _first(strands, i, e), strands.edge_node[e]
+        for d in range(3):
+            moved += rate[i, c, first + d] * (node_vectors[n + 1, d] - node_vectors[n, d])
+        moved += rate[i, c, first + 3] * angles[e]
+    return moved
+
+
+@kernel
+def write_rail_motions(rails, strands, rate, node_vectors, angles, out):
+    """Write the motions of rails at first order, from those of nodes and the turns of edges."""
+    for i in range(rails.height.shape[0]):
+        for c in range(3):
+            out[i, c] = node_vectors[i, c]
+            if rails.height[i] != 0.0:
+                out[i, c] += arm_motion(rails, strands, rate, node_vectors, angles, i, c)
+
+
+@kernel
+def write_rail_slips(rails, strands, stage, at):
+    """Write the motions of rails since the origin of a stage with frozen rates [m]."""
+    motion, turn = rails.node_motion, rails.turn
+    for i in range(motion.shape[0]):
+        for c in range(3):
+            motion[i, c] = at.position[i, c] - stage.origin_position[i, c]
+    for e in range(turn.shape[0]):
+        turn[e] = at.total_angle[e] - stage.origin_angle[e]
+    write_rail_motions(rails, strands, rails.slip_rate, motion, turn, rails.slip)
+
+
+@kernel
+def write_rail_curvature(rails, strands, at):
+    """Write the second derivatives of arms times `Rails.gradient` by edges, shape (n_edge, 4, 4)."""
+    out = rails.curvature
+    for e in range(out.shape[0]):
+        for m in range(4):
+            for n in range(4):
+                out[e, m, n] = 0.0
+    for i in range(rails.height.shape[0]):
+        g = row(rails.gradient, i)
+        if rails.height[i] == 0.0 or (g[0] == 0.0 and g[1] == 0.0 and g[2] == 0.0):
+            continue
+        share, count = _share(rails, i)
+        share *= rails.height[i]
+        for side in range(count):
+            e = rails.node_edges[i, side]
+            t, a, length = row(at.tangent, e), row(at.director1, e), at.length[e]
+            turned, along = cross(t, a), dot(g, t)
+            across = g[0] - along * t[0], g[1] - along * t[1], g[2] - along * t[2]
+            s = share / (length * length)
+            for c in range(3):
+                for d in range(3):
+                    out[e, c, d] += s * (
+                        along * (a[c] * t[d] + t[c] * a[d]) - 0.5 * (a[c] * across[d] + across[c] * a[d])
+                    )
+                out[e, c, 3] -= share * along * turned[c] / length
+            out[e, 3, 3] -= share * dot(g, a)

@@ -1,0 +1,159 @@
+"""Rods of unlike layers meet with their faces, off the curves that the laminate follows."""
+
+import numpy as np
+import pytest
+from support.evaluations import GRADIENT_LIMIT, HESSIAN_LIMIT, Problem
+from support.sample_scenes import GEL, contact, fixed, layer, rod, scene
+
+from bilayer_core import Simulator, load_scene
+from bilayer_core.contact.rod_bound import FAR
+from bilayer_core.contact.step_bound import KEPT_FRACTION
+from bilayer_core.testing.gaps import GapCheck
+
+MATERIALS = {"gel": GEL, "paper": {**GEL, "youngs_modulus": 2e9}}
+
+
+def unlike(names=("gel", "paper")):
+    return [layer(name, material=name) for name in names]
+
+
+def pressed(hub, dimension):
+    """A rod that a body holds over two others that lie across each other's meshes; all have unlike layers."""
+    top = rod(unlike(), length=0.02, stations=7, start=(0, 0, 0.5e-3), name="top", clamp_start="hub")
+    middle = rod(unlike(("paper", "gel")), length=0.02, stations=8, start=(-0.004, 0, -2.4e-3), name="middle")
+    low = rod([layer()], length=0.015, stations=5, start=(0, 0, -4.8e-3), name="low", clamp_start="hub")
+    low["layers"][0]["thickness"] = 2e-3
+    if dimension == 3:
+        middle["path"]["start"][1] = 1e-4
+    motion = {"type": "prescribed"} if hub == "prescribed" else {"type": "free", "mass": 1e-3, "inertia": [2e-8] * 3}
+    bodies = [{"name": "hub", "position": [0, 0, 0], "motion": motion}]
+    law = {**contact(coefficient=0.4, speed_threshold=10.0), "rods": True}
+    return scene([top, middle, low], bodies=bodies, contact=law, materials=MATERIALS)
+
+
+@pytest.mark.parametrize("hub", ["prescribed", "free"])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_derivatives_of_contact_of_unlike_layers_are_those_of_steps(dimension, hub):
+    content = pressed(hub, dimension)
+    problem = Problem(
+        content, np.random.default_rng(2), "laminate", dimension, h=1e-5, noise=3e-5, origin_noise=1e-6, turns=2e-3
+    )
+    evaluator, free, scale = problem.evaluator, problem.free, problem.scale
+    assert np.abs(problem.model.rails.height).max() > 0.4e-3
+    terms = evaluator.evaluate(problem.at, second=True)
+    assert all(terms[term] > 0.0 for term in ("rod barrier", "rod friction"))
+    contacts = evaluator.problem.rod_contact.contacts
+    assert contacts.count[0] > 20
+    for force in ("rod barrier", "rod friction"):
+        evaluator.evaluate(problem.at, (force,))
+        gradient = problem.gradient()[free]
+        errors = [np.abs(problem.differences(h, (force,))[0] - gradient).max() for h in (3e-9, 1e-8, 3e-8)]
+        assert min(errors) < 10 * GRADIENT_LIMIT * np.abs(gradient).max()
+    evaluator.evaluate(problem.at, second=True)
+    assert evaluator.factorise(problem.at) == (0.0, 0)
+    loads, rng = [], np.random.default_rng(5)
+    for _ in range(3):
+        load = np.zeros(len(scale))
+        load[free] = rng.standard_normal(len(free)) / scale[free]
+        full = problem.basis @ load
+        parts = evaluator.newton_step(full[: problem.size], full[problem.size :].reshape(-1, 6))
+        loads.append((load * scale, problem.basis.T @ np.concatenate([p.ravel() for p in parts]) / scale))
+    errors = []
+    for h in (3e-9, 1e-8, 3e-8):
+        by_gradient = problem.differences(h)[1]
+        by_gradient = 0.5 * (by_gradient + by_gradient.T)  # frames are transported: see `check`
+        errors.append(max(np.abs(by_gradient @ step[free] + load[free]).max() for load, step in loads))
+    assert min(errors) < HESSIAN_LIMIT * max(np.abs(load).max() for load, _ in loads)
+
+
+def loose(seed, noise=5e-5):
+    """The same rods in space, held by nothing."""
+    content = pressed("prescribed", 3)
+    for each in content["rods"]:
+        each.pop("clamp_start", None)
+    del content["bodies"]
+    return Problem(content, np.random.default_rng(seed), "laminate", h=1e-5, noise=noise, origin_noise=1e-6, turns=0.05)
+
+
+def test_contact_of_unlike_layers_exerts_no_net_force_and_no_moment():
+    problem = loose(3)
+    evaluator, layout, rods = problem.evaluator, problem.model.layout, problem.model.rods
+    for force in ("rod barrier", "rod friction"):
+        assert evaluator.evaluate(problem.at, (force,))[force] > 0.0
+        gradient = evaluator.sums.gradient
+        of_nodes = gradient[layout.node[:, None] + np.arange(3)]
+        scale = np.abs(of_nodes).sum()
+        assert np.abs(of_nodes.sum(axis=0)).max() < 1e-13 * scale
+        if force == "rod friction":
+            continue  # it acts on the middles, at a distance: see `forces.rod_contact`
+        moment = np.cross(problem.at.position, of_nodes).sum(axis=0)
+        moment += gradient[layout.edge] @ problem.at.tangent[: rods.edge_count]
+        assert np.abs(moment).max() < 1e-13 * scale * 0.02
+
+
+def rails(problem, at):
+    """Middles between the faces of the rods at a configuration, shape (n_node, 3)."""
+    edges, position = problem.model.surfaces.node_edges, at.position
+    offset = np.concatenate([strand.offset for strand in problem.model.strands])
+    return position + offset[:, None] * at.director1[edges].mean(axis=1)
+
+
+def gaps(problem, at):
+    """Of all points of each rod from all segments of the others [m]."""
+    search, place, edge_node = problem.model.rod_search, rails(problem, at), problem.model.rods.edge_node
+    i, s = edge_node[search.point_edge], search.point_fraction[:, None]
+    points = (1.0 - s) * place[i] + s * place[i + 1]
+    along, between = place[edge_node + 1] - place[edge_node], points[:, None] - place[edge_node]
+    t = np.clip((between * along).sum(axis=2) / (along**2).sum(axis=1), 0.0, 1.0)
+    distance = np.linalg.norm(between - t[..., None] * along, axis=2)
+    other = search.edge_rod[search.point_edge][:, None] != search.edge_rod
+    return (distance - search.edge_radius[search.point_edge][:, None] - search.edge_radius)[other]
+
+
+@pytest.mark.parametrize("size", [3e-5, 3e-4, 3e-3])
+def test_a_step_that_moves_and_turns_rods_keeps_a_part_of_every_gap_up_to_its_bound(size):
+    problem, rng, cut = loose(4, noise=2e-5), np.random.default_rng(6), 0
+    d_hat = problem.model.scene.contact.barrier_distance
+    problem.evaluator.evaluate(problem.at, second=True)
+    before = gaps(problem, problem.at)
+    assert before.min() == pytest.approx(problem.evaluator.gap, rel=1e-9) and before.min() < d_hat
+    for _ in range(20):
+        smooth = np.repeat(rng.standard_normal((3, 3)), [7, 8, 5], axis=0)
+        step = 0.1 * rng.standard_normal(len(problem.scale))
+        layout = problem.model.layout
+        step[layout.node[:, None] + np.arange(3)] += smooth
+        step[layout.edge] = rng.standard_normal(len(layout.edge))
+        parts = problem.split(size * step)
+        try:
+            fraction = problem.evaluator.bound(problem.at, *parts).fraction
+        except LookupError:  # a longer list of near pairs, for which there is capacity now
+            problem.evaluator.evaluate(problem.at, second=True)
+            fraction = problem.evaluator.bound(problem.at, *parts).fraction
+        assert 0.0 < fraction <= 1.0
+        cut += fraction < 1.0
+        for part in np.linspace(0.0, fraction, 30):
+            problem.move(problem.at, part * size * step, problem.trial)
+            kept = gaps(problem, problem.trial) / np.minimum(before, FAR * d_hat)
+            assert kept.min() >= KEPT_FRACTION * (1.0 - 1e-9)
+    assert cut > 3 or size < 1e-4
+
+
+@pytest.mark.parametrize("model", ["laminate", "two_rod"])
+def test_strips_of_unlike_layers_rest_on_each_other_with_their_faces(model):
+    thickness, d_hat, strips = 2e-3, 2e-4, []
+    for name, start in (("low", 0.0), ("high", thickness + 1.5 * d_hat)):
+        strips.append(rod(unlike(), length=0.03, stations=16, start=(0, 0, start), name=name))
+    strips[0] |= {"clamp_start": "wall", "clamp_end": "wall"}
+    content = scene(
+        strips,
+        bodies=[fixed()],
+        contact={"barrier_distance": d_hat, "stiffness": 1e7, "rods": True},
+        materials=MATERIALS,
+        gravity=[0, 0, -9.81],
+        damping={"mass": 50.0},
+        solver={"model": model, "dimension": 2, "integrator": "sdirk2", "dt": 1e-3},
+    )
+    simulator = Simulator(load_scene(content))
+    simulator.run(0.3)
+    judge = GapCheck(simulator.model)
+    assert judge.smallest(judge.moment(simulator.frame())) == pytest.approx(d_hat, rel=0.02)
