@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from scipy.optimize import brentq
@@ -41,6 +41,28 @@ def acceleration(simulator: Simulator, settle: float = 0.05, time: float = 0.2) 
     before = simulator.velocities.mean(axis=0)
     simulator.run(time)
     return (simulator.velocities.mean(axis=0) - before) / time
+
+
+def stacked(model: str, dimension: int) -> tuple[float, float]:
+    """Distance of the middles of two strips of unlike layers, one on the other on the ground [mm]."""
+    unlike = {"paper": {"youngs_modulus": 2e9, "poisson_ratio": 0.4, "density": 1000.0}}
+    layers = [layer("bottom"), layer("top", material="paper")]
+    heights = {"low": 1.999e-3, "high": 4.998e-3}
+    strips = [rod(layers, 0.05, 11, (0, 0, height), name) for name, height in heights.items()]
+    config = scene(
+        strips,
+        gravity=[0, 0, -GRAVITY],
+        obstacles=[GROUND],
+        contact=contact(),
+        solver={"model": model, "dimension": dimension},
+    )
+    config["materials"] |= unlike
+    simulator = Simulator(load_scene(config))
+    simulator.solve_static()
+    first, last = (  # nodes of the bottom layer, or of the laminate
+        strand.first_node for strand in simulator.model.strands if strand.name.split("/")[1] in ("bottom", "laminate")
+    )
+    return 1e3 * float(simulator.positions[last + 5, 2] - simulator.positions[first + 5, 2]), 2.0 + 1e3 * resting_gap()
 
 
 @cache
@@ -186,6 +208,17 @@ CASES = [
         "level while the slope across is below (w − h)/h, here 0.95 of it: cosine of the roll",
         1e-4,
         lambda: (upright(0.95), 1.0),
+    ),
+    *(
+        Case(
+            f"contact/unlike strips on each other/{model}, {dimension}-D",
+            "thickness and the gap at which the barrier carries the weight: distance of middles",
+            1e-7,
+            partial(stacked, model, dimension),
+            "mm",
+        )
+        for model in ("laminate", "two_rod")
+        for dimension in (2, 3)
     ),
     Case("contact/rebound at 14 m/s", "energy of a flat strip with sound at 3 m/s, over that before", 0.005, rebound),
     Case("contact/creep", "ε_v (1 − √(1 − tan α/μ))", 0.01, creep, "µm/s"),
