@@ -8,7 +8,8 @@ scipy's k-d tree finds anew at every look; distances are computed by other formu
   on them, no farther apart than that radius: where two cross between points, the capsules may overlap by a thirtieth
   of the radius at most, √(4 + 1/4) − 2 = 0.06 for two together. On one rod, edges count that are at least as far apart
   along it as the model's own exclusion (`model.rod_surfaces`).
-- Surfaces are met by rods, by balls and by the corners and rims of bodies (`testing.surfaces`).
+- Surfaces are met by ribbons as they are (`testing.ribbons`), by balls and by the corners and rims of bodies
+  (`testing.surfaces`).
 
 A look at the ends of a step cannot see what passed through something thin within it. So the straight way from the last
 look is gone through in parts, none of which moves anything by more than half of the smallest radius: what is deeper
@@ -28,7 +29,8 @@ from scipy.spatial.transform import Rotation
 
 from bilayer_core.model.model import Model
 from bilayer_core.observed.frame import Frame
-from bilayer_core.testing.surfaces import MeetingPoints, surfaces_of
+from bilayer_core.testing.ribbons import Ribbons
+from bilayer_core.testing.surfaces import BodyPoints, surfaces_of
 
 Array = np.ndarray
 MOST_PAIRS = 45_000
@@ -50,7 +52,8 @@ class Moment:
     """Where everything is at one time."""
 
     nodes: Array  # of rods [m], shape (n_node, 3)
-    points: Array  # what meets surfaces, in the order of `GapCheck` [m], shape (n_point, 3)
+    sections: Array  # of ribbons: `Ribbons.sections`
+    points: Array  # of bodies, `BodyPoints` [m], shape (n_point, 3)
     surface_position: Array  # [m], shape (n_surface, 3)
     surface_rotation: Array  # columns are its axes, shape (n_surface, 3, 3)
 
@@ -69,27 +72,24 @@ class GapCheck:
         self._edge = model.rods.edge_node
         self._pairs = PairsOfEdges(model) if model.rod_search.exists else None
         self.every = max(1, math.ceil(self._pairs.count / MOST_PAIRS)) if self._pairs else 1
-        self._points = MeetingPoints(model)
+        self._points, self._ribbons = BodyPoints(model), Ribbons(model)
         self._surfaces = surfaces_of(model, self._points)
-        radius = self._points.node_radius
-        self._start = self._points.middles(model.start_position, model.start_director1)
-        thickest = [
-            np.full(s.node_count - 1, radius[s.first_node : s.first_node + s.node_count].max()) for s in model.strands
-        ]
-        self._edge_radius = np.concatenate(thickest)
+        edge = self._ribbons.edge
+        self._meeting = [np.flatnonzero(of.nodes[edge] & of.nodes[edge + 1]) for of in self._surfaces]
+        self._edge_radius = model.rod_search.edge_radius
         self._fractions = fractions_of_points(model)
-        self._smallest_radius = float(radius[model.node_length > 0.0].min())
+        self._smallest_radius = float(self._ribbons.radius[model.node_length > 0.0].min())
         if self._pairs:
             self._leave_out_joined()
         self._before: Moment | None = None
 
     def _leave_out_joined(self) -> None:
         """Leave out pairs of edges that touch at the start, of rods that one body holds side by side."""
-        rods, start = self._model.rod_search, self._start
+        rods, start = self._model.rod_search, self._model.start_position
         first, second = self._pairs.at(start)
         joined = rods.rod_joined[rods.edge_rod[first], rods.edge_rod[second]]
         gap, _ = self._rod_gaps(start)
-        self._pairs.leave_out(start, joined & (gap < self._model.scene.contact.barrier_distance))
+        self._pairs.leave_out(joined & (gap < self._model.scene.contact.barrier_distance))
 
     @property
     def checks_anything(self) -> bool:
@@ -103,10 +103,10 @@ class GapCheck:
             for position, quaternion in zip(frame.body_positions, frame.body_quaternions, strict=True)
         ]
         poses.append((np.zeros(3), np.eye(3)))  # the world
-        points = self._points.places(frame)
         return Moment(
-            points[: self._model.node_count],
-            points,
+            frame.positions[: self._model.node_count],
+            self._ribbons.sections(frame) if self._surfaces else np.empty((2, 0, 3)),
+            self._points.places(frame),
             np.array([poses[s.body][0] + poses[s.body][1] @ s.position for s in self._surfaces]).reshape(-1, 3),
             np.array([poses[s.body][1] @ s.rotation for s in self._surfaces]).reshape(-1, 3, 3),
         )
@@ -116,8 +116,7 @@ class GapCheck:
         gaps = [math.inf]
         if self._pairs:
             gaps.append(float(self._rod_gaps(at.nodes)[0].min(initial=math.inf)))
-        gaps += [float(gap.min()) for gap in self._surface_gaps(at) if gap.size]
-        return min(gaps)
+        return min(gaps + self._surface_gaps(at, math.inf))
 
     def crossed(self, at: Moment) -> str:
         """Describe a deep overlap on the straight way from the last look to this one; empty if there was none."""
@@ -129,9 +128,10 @@ class GapCheck:
             return ""
         rods = _parts(_largest(at.nodes - before.nodes), self._smallest_radius) if self._pairs else 0
         points, positions = at.points - before.points, at.surface_position - before.surface_position
+        sections = at.sections - before.sections
         surfaces = [
-            _parts(_largest(points[surface.points] - way), surface.smallest)
-            for surface, way in zip(self._surfaces, positions, strict=True)
+            _parts(max(_largest(points[of.points] - way), self._way(sections[:, of.nodes], way)), of.smallest)
+            for of, way in zip(self._surfaces, positions, strict=True)
         ]
         ends = list(zip(vars(before).values(), vars(at).values(), strict=True))
         for part in np.linspace(0.0, 1.0, max([rods, *surfaces]) + 1)[1:-1]:
@@ -151,11 +151,17 @@ class GapCheck:
                 against = np.linalg.norm(middle[first] - middle[second], axis=1)
                 if (2.0 * against <= self._pairs.length_between(first, second)).any():
                     return "a rod passed through a rod"
-        gaps = self._surface_gaps(at)
-        for surface, gap, wanted in zip(self._surfaces, gaps, with_surfaces, strict=True):
-            if wanted and gap.size and float(gap.min()) < -DEEP * surface.smallest:
+        gaps = self._surface_gaps(at, 0.0) if any(with_surfaces) else []
+        for surface, gap, wanted in zip(self._surfaces, gaps, with_surfaces, strict=False):
+            if wanted and gap < -DEEP * surface.smallest:
                 return f"something passed through {surface.name}"
         return ""
+
+    @staticmethod
+    def _way(sections: Array, way: Array) -> float:
+        """Return the farthest way of a point of sections that move by so much, to a surface that moves by `way` [m]."""
+        middle, half = sections
+        return _largest(middle - way) + _largest(half)
 
     def _rod_gaps(self, nodes: Array) -> tuple[Array, Array]:
         """Gap of each pair of edges, or a lower bound where that is above the barrier distance, and their radii [m]."""
@@ -184,14 +190,18 @@ class GapCheck:
             smallest = np.fmin(smallest, np.fmin.reduce(distances, axis=1))
         return smallest
 
-    def _surface_gaps(self, at: Moment) -> list[Array]:
-        """Gaps of all that can meet each surface [m]."""
-        return [
-            surface.distance((at.points[surface.points] - position) @ rotation) - surface.radii
-            for surface, position, rotation in zip(
-                self._surfaces, at.surface_position, at.surface_rotation, strict=True
-            )
-        ]
+    def _surface_gaps(self, at: Moment, enough: float) -> list[float]:
+        """Return the least gap of all that can meet each surface [m]; of ribbons, that it is not below `enough`."""
+        if not self._surfaces:
+            return []
+        sheet, found = self._ribbons.sheet(at.sections), []
+        for number, surface in enumerate(self._surfaces):
+            place = at.surface_position[number], at.surface_rotation[number]
+            of_bodies = surface.distance((at.points[surface.points] - place[0]) @ place[1]) - surface.radii
+            unit = self._model.scene.contact.barrier_distance
+            of_ribbons = sheet.least_gap(self._meeting[number], surface, place, unit, enough)
+            found.append(min(of_ribbons, float(of_bodies.min(initial=math.inf))))
+        return found
 
 
 def from_segment(p: Array, a: Array, b: Array) -> Array:
@@ -253,9 +263,9 @@ class PairsOfEdges:
         keep = ~np.isin(self._number(first, second), self._left_out)
         return first[keep], second[keep]
 
-    def leave_out(self, start: Array, out: Array) -> None:
-        """Leave out pairs, of those with nodes at the start [m], from now on."""
-        first, second = self.at(start)
+    def leave_out(self, out: Array) -> None:
+        """Leave out pairs, of those at the start, from now on."""
+        first, second = self.at(self._model.start_position)
         if self._all is not None:
             self._all = first[~out], second[~out]
         else:

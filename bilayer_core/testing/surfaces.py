@@ -12,72 +12,42 @@ from bilayer_core.model.model import Model
 from bilayer_core.observed.frame import Frame
 
 Array = np.ndarray
+TINY = 1e-12
+"""Distance from an edge [m] below which the curvature about it counts as that."""
 
 
-class MeetingPoints:
-    """All points with a radius that can meet surfaces, in one row.
-
-    Of each node the middle of its section and, in space, its two borders, by the directors of the edges beside it; the
-    corners and rims of bodies; and the centres of balls.
+class BodyPoints:
+    """All points of bodies with a radius that can meet surfaces, in one row: corners and rims, and centres of balls.
 
     Attributes
     ----------
-    node_radius : Array
-        Half the thickness [m], shape (n_node,).
     radius : Array
         Of each point [m], shape (n_point,).
-    node : Array
-        Whose section it belongs to, −1 of bodies' points, shape (n_point,).
     body : Array
-        That it belongs to, −1 of rods, shape (n_point,).
+        That it belongs to, shape (n_point,).
     slot : Array
         Among the contact points of the model, −1 of balls, shape (n_point,).
     """
 
     def __init__(self, model: Model):
-        self._model = model
-        nodes = model.node_count
-        self.node_radius, half_width, self._offset = np.zeros((3, nodes))
-        for strand in model.strands:
-            own = slice(strand.first_node, strand.first_node + strand.node_count)
-            self.node_radius[own], half_width[own] = 0.5 * strand.thickness, 0.5 * strand.width
-            self._offset[own] = strand.offset
-        beyond = np.zeros(nodes) if model.plane.exists else np.maximum(half_width - self.node_radius, 0.0)
-        self._sides = [np.zeros(nodes), -beyond, beyond] if beyond.any() else [np.zeros(nodes)]
+        self._nodes, contact = model.node_count, model.surfaces
         self._balls = [
             index for index, shape in enumerate(model.bodies.shapes) if shape is not None and shape.kind == "sphere"
         ]
-        contact = model.surfaces
-        shown = np.arange(nodes, nodes + model.point_count)
-        copies = len(self._sides)
+        shown = np.arange(self._nodes, self._nodes + model.point_count)
         radii = [float(model.bodies.shapes[ball].half[0]) for ball in self._balls]
-        self.radius = np.concatenate([np.tile(self.node_radius, copies), contact.radius[shown], radii])
-        rest = np.full(len(shown) + len(self._balls), -1)
-        self.node = np.concatenate([np.tile(np.arange(nodes), copies), rest])
-        self.body = np.concatenate(
-            [np.full(copies * nodes, -1), contact.contact_point_body[shown], self._balls]
-        ).astype(np.int64)
-        self.slot = np.concatenate([np.tile(np.arange(nodes), copies), shown, np.full(len(self._balls), -1)])
-
-    def middles(self, position: Array, directors: Array) -> Array:
-        """Middles of the sections of nodes [m], shape (n_node, 3)."""
-        return position + self._offset[:, None] * directors[self._model.surfaces.node_edges].mean(axis=1)
+        self.radius = np.concatenate([contact.radius[shown], radii])
+        self.body = np.concatenate([contact.contact_point_body[shown], self._balls]).astype(np.int64)
+        self.slot = np.concatenate([shown, np.full(len(self._balls), -1)])
 
     def places(self, frame: Frame) -> Array:
         """Where they are [m], shape (n_point, 3)."""
-        model, nodes = self._model, self._model.node_count
-        position, edges = frame.positions[:nodes], model.surfaces.node_edges
-        along = position[model.rods.edge_node + 1] - position[model.rods.edge_node]
-        tangent = along / np.linalg.norm(along, axis=1)[:, None]
-        m2 = np.cross(tangent, frame.directors)[edges].mean(axis=1)
-        middle = self.middles(position, frame.directors)
-        sections = [middle + side[:, None] * m2 for side in self._sides]
-        return np.concatenate([*sections, frame.positions[nodes:], frame.body_positions[self._balls]])
+        return np.concatenate([frame.positions[self._nodes :], frame.body_positions[self._balls]])
 
 
 @dataclass(frozen=True)
 class MetSurface:
-    """A surface, and which of the `MeetingPoints` can meet it, with their radii [m].
+    """A surface, which of the `BodyPoints` can meet it, with their radii [m], and which nodes of rods.
 
     `half` are its half sizes, rounding included [m]; `body` the index of its owner, after the last that of the world.
     """
@@ -91,6 +61,7 @@ class MetSurface:
     rotation: Array
     points: Array
     radii: Array
+    nodes: Array
 
     @property
     def smallest(self) -> float:
@@ -111,8 +82,25 @@ class MetSurface:
         outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
         return np.where((beyond > 0.0).any(axis=1), outside, beyond.max(axis=1)) - self.rounding
 
+    def bend(self, x: Array, reach: Array) -> Array:
+        """Return a bound of the curvature of `distance` within `reach` [m] of points of its frame [1/m], shape (n,)."""
+        if self.kind == "plane":
+            return np.zeros(len(x))
+        if self.kind == "sphere":
+            return 1.0 / np.maximum(np.linalg.norm(x, axis=1) - reach, TINY)
+        core = self.half - self.rounding
+        if self.kind == "box":
+            across, round_about = np.abs(x) - core, np.zeros(len(x))
+        else:
+            from_axis = np.hypot(x[:, 0], x[:, 1])
+            across = np.stack([from_axis - core[0], np.abs(x[:, 2]) - core[2]], axis=1)
+            round_about = np.where(from_axis - core[0] > -reach, 1.0 / np.maximum(from_axis - reach, TINY), 0.0)
+        one_face = (across > reach[:, None]).any(axis=1) & ((across > -reach[:, None]).sum(axis=1) == 1)
+        outside = np.linalg.norm(np.maximum(across, 0.0), axis=1)
+        return round_about + np.where(one_face, 0.0, 1.0 / np.maximum(outside - reach, TINY))
 
-def surfaces_of(model: Model, points: MeetingPoints) -> list[MetSurface]:
+
+def surfaces_of(model: Model, points: BodyPoints) -> list[MetSurface]:
     """All surfaces that anything can meet."""
     if model.scene.contact is None or not model.has_surface_contact:
         return []
@@ -120,7 +108,8 @@ def surfaces_of(model: Model, points: MeetingPoints) -> list[MetSurface]:
     for owned in owned_shapes(model.scene, model.bodies):
         if owned.collider.name not in model.surface_names:
             continue
-        meeting = np.flatnonzero(_can_meet(model, points, owned))
+        meets = model.surfaces.can_collide[model.surface_names.index(owned.collider.name)][model.surfaces.group]
+        meeting = np.flatnonzero(_points_meet(model, points, owned, meets))
         found.append(
             MetSurface(
                 owned.collider.name,
@@ -132,24 +121,23 @@ def surfaces_of(model: Model, points: MeetingPoints) -> list[MetSurface]:
                 owned.rotation @ owned.shape.rotation,
                 meeting,
                 points.radius[meeting],
+                _nodes_meet(model, meets),
             )
         )
     return found
 
 
-def _can_meet(model: Model, points: MeetingPoints, owned: Owned) -> Array:
-    """Which points can meet a surface, shape (n_point,): not those of its own body, nor of a rod that grows out of it;
-    of what goes by schedules, none meets another.
+def _nodes_meet(model: Model, meets: Array) -> Array:
+    """Which nodes of rods can meet a surface, shape (n_node,): not those that grow out of its body."""
+    of_rods, found = model.surfaces.rod_points.node, meets[: model.node_count].copy()
+    np.logical_or.at(found, of_rods, meets[len(meets) - len(of_rods) :])
+    return found
+
+
+def _points_meet(model: Model, points: BodyPoints, owned: Owned, meets: Array) -> Array:
+    """Which points can meet a surface, shape (n_point,): not those of its own body; of what goes by schedules, none
+    meets another.
     """
-    surfaces, of_rods = model.surfaces, model.surfaces.rod_points.node
-    meets = surfaces.can_collide[model.surface_names.index(owned.collider.name)][surfaces.group]
-    section = meets[: model.node_count].copy()
-    np.logical_or.at(section, of_rods, meets[len(meets) - len(of_rods) :])
-    can = np.zeros(len(points.radius), dtype=bool)
-    sections, listed = points.node >= 0, points.slot >= model.node_count
-    can[sections] = section[points.node[sections]]
-    can[listed] = meets[points.slot[listed]]
     free = np.append(model.free_bodies.free_index[: len(model.bodies.names)] >= 0, False)
     balls = points.slot < 0
-    can[balls] = free[points.body[balls]] | free[owned.body]
-    return can & (points.body != owned.body)
+    return np.where(balls, free[points.body] | free[owned.body], meets[points.slot]) & (points.body != owned.body)

@@ -1,0 +1,154 @@
+"""Ribbons as they are: sections with rounded borders across a smooth curve through the stations.
+
+A ribbon is its middle sheet c(s) + u a(s), −1 ≤ u ≤ 1, about which half the thickness lies on all sides. c is the
+middle between the outer faces, and a reaches along m2 to half the width less half the thickness. Between stations both
+are cubics; their slope at a station is that of the parabola through it and its two neighbours.
+
+`least_gap` halves pieces of the sheet. A piece goes once no point of it can be nearer to the surface than what was
+found: distances change by no more than the way, and from those of its corners by no more than ½ k way² + e where the
+surface bends by k and the piece lies within e of its corners. So pieces become as small as what is near demands, and
+no grid decides what is seen.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from bilayer_core.model.model import Model
+from bilayer_core.observed.frame import Frame
+from bilayer_core.testing.surfaces import MetSurface
+
+Array = np.ndarray
+FINE = 0.02
+"""Part of the barrier distance to which gaps are found."""
+SMALLEST = 0.05
+"""Part of the barrier distance below which pieces are not halved."""
+LOOKED_AT = np.array([(0, -1, -1, 1, 1), (0, -1, 1, -1, 1)], dtype=float)[:, :, None]
+"""Places on a piece in half lengths, along and across, its middle first."""
+
+
+class Ribbons:
+    """The ribbons of a model.
+
+    Attributes
+    ----------
+    edge : Array
+        First node of each stretch between two stations, shape (n_edge,).
+    """
+
+    def __init__(self, model: Model):
+        self._model, nodes = model, model.node_count
+        self.radius, self._reach, self._offset = np.zeros((3, nodes))
+        edges = []
+        for strand in model.strands:
+            own = slice(strand.first_node, strand.first_node + strand.node_count)
+            self.radius[own], self._offset[own] = 0.5 * strand.thickness, strand.offset
+            if not model.plane.exists:
+                self._reach[own] = np.maximum(0.5 * strand.width - self.radius[own], 0.0)
+            edges.append(np.arange(strand.first_node, strand.last_node if not strand.closed else own.stop - 2))
+        self.edge = np.concatenate(edges)
+        self._length = np.linalg.norm(np.diff(model.start_position[:nodes], axis=0), axis=1)[:, None]
+
+    def sections(self, frame: Frame) -> Array:
+        """Return c and a of each node [m], shape (2, n_node, 3)."""
+        model, nodes = self._model, self._model.node_count
+        position, first = frame.positions[:nodes], model.rods.edge_node
+        tangent = position[first + 1] - position[first]
+        tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+        m1, m2 = np.zeros((2, nodes, 3))
+        for node in (first, first + 1):
+            np.add.at(m1, node, frame.directors)
+            np.add.at(m2, node, np.cross(tangent, frame.directors))
+        for strand in model.strands:
+            if strand.closed:
+                begin, end = strand.first_node, strand.first_node + strand.node_count - 2
+                for of in (m1, m2):
+                    of[begin], of[end + 1] = of[end], of[begin + 1]
+        m1, m2 = (of / np.linalg.norm(of, axis=1)[:, None] for of in (m1, m2))
+        return np.stack([position + self._offset[:, None] * m1, self._reach[:, None] * m2])
+
+    def sheet(self, sections: Array) -> Sheet:
+        """Return the sheet through sections."""
+        secant = np.diff(sections, axis=1) / self._length
+        slope = np.zeros_like(sections)
+        before, after = self._length[:-1], self._length[1:]
+        slope[:, 1:-1] = (after * secant[:, :-1] + before * secant[:, 1:]) / (before + after)
+        for strand in self._model.strands:
+            first, last = strand.first_node, strand.first_node + strand.node_count - 1
+            if strand.closed:
+                slope[:, first] = slope[:, last - 1]
+            else:
+                slope[:, first], slope[:, last] = secant[:, first], secant[:, last - 1]
+                if last > first + 1:
+                    slope[:, first] += 0.5 * (secant[:, first] - slope[:, first + 1])
+                    slope[:, last] += 0.5 * (secant[:, last - 1] - slope[:, last - 1])
+        third = self._length[self.edge] / 3.0
+        begin, end = sections[:, self.edge], sections[:, self.edge + 1]
+        inner = begin + third * slope[:, self.edge], end - third * slope[:, self.edge + 1]
+        points = np.stack([begin, *inner, end], axis=2)
+        return Sheet(points, np.stack([self.radius[self.edge], self.radius[self.edge + 1]], axis=1))
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """Bézier points of c and a of each stretch [m], shape (2, n_edge, 4, 3), and its radii at both ends [m]."""
+
+    points: Array
+    radius: Array
+
+    def at(self, edge: Array, along: Array, across: Array) -> tuple[Array, Array]:
+        """Return places [m], shape (n, 3), and half thicknesses there [m], 0 ≤ along ≤ 1."""
+        rest = 1.0 - along
+        weight = np.stack([rest**3, 3.0 * rest**2 * along, 3.0 * rest * along**2, along**3], axis=-1)
+        middle, half = np.einsum("kncd,nc->knd", self.points[:, edge], weight)
+        return middle + across[:, None] * half, rest * self.radius[edge, 0] + along * self.radius[edge, 1]
+
+    def ways(self) -> tuple[Array, Array, Array, Array]:
+        """Return bounds of stretches: ways per step along and across, and of the bend along and the turn of sections
+        [m], each of shape (n_edge,).
+        """
+        size = np.linalg.norm(self.points, axis=3)
+        first = 3.0 * np.linalg.norm(np.diff(self.points, axis=2), axis=3).max(axis=2)
+        second = 6.0 * np.linalg.norm(np.diff(self.points, 2, axis=2), axis=3).max(axis=2)
+        return first.sum(axis=0), size[1].max(axis=1), second.sum(axis=0), first[1]
+
+    def least_gap(self, edges: Array, surface: MetSurface, place: tuple[Array, Array], unit: float, enough: float):
+        """Return the least gap of some stretches to a surface [m], or a number not below `enough` if it is larger.
+
+        Parameters
+        ----------
+        edges : Array
+        surface : MetSurface
+        place : tuple of Array
+            Position and rotation of the surface.
+        unit : float
+            The barrier distance [m], to a part of which the gap is found.
+        enough : float
+        """
+        along_way, across_way, bend, turn = self.ways()
+        edge, along, across = edges, np.full(len(edges), 0.5), np.zeros(len(edges))
+        step, half = np.full(len(edges), 0.5), np.where(across_way[edges] > 0.0, 1.0, 0.0)
+        least = math.inf
+        while edge.size:
+            places = along + LOOKED_AT[0] * step, across + LOOKED_AT[1] * half
+            x, radius = self.at(np.tile(edge, LOOKED_AT.shape[1]), *(of.ravel() for of in places))
+            local = (x - place[0]) @ place[1]
+            gaps = (surface.distance(local) - radius).reshape(LOOKED_AT.shape[1], -1)
+            least = min(least, float(gaps.min()))
+            way = along_way[edge] * step, across_way[edge] * half
+            reach = way[0] + way[1]
+            left = 0.5 * surface.bend(local[: edge.size], reach) * reach**2
+            left += 0.5 * bend[edge] * step**2 + turn[edge] * step * half
+            lowest = gaps.min(axis=0) - np.minimum(left, reach)
+            go_on = (lowest < min(least, enough) - FINE * unit) & (reach > SMALLEST * unit)
+            edge, along, across, step, half = (of[go_on] for of in (edge, along, across, step, half))
+            lengthwise = (way[0] >= way[1])[go_on]
+            step, half = np.where(lengthwise, 0.5 * step, step), np.where(lengthwise, half, 0.5 * half)
+            moved = np.where(lengthwise, step, 0.0), np.where(lengthwise, 0.0, half)
+            along = np.concatenate([along - moved[0], along + moved[0]])
+            across = np.concatenate([across - moved[1], across + moved[1]])
+            edge, step, half = (np.tile(of, 2) for of in (edge, step, half))
+        return least
