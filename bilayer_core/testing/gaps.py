@@ -4,12 +4,9 @@ Nothing here is shared with the solver but the geometry of the scene: what has w
 half edges. All pairs are looked at, without lists of near ones, but for robots of thousands of edges, whose near pairs
 scipy's k-d tree finds anew at every look; distances are computed by other formulas.
 
-- Rods are capsules about their edges, with the radius that the model gives them. They meet where the model has points
-  on them, no farther apart than that radius: where two cross between points, the capsules may overlap by a thirtieth
-  of the radius at most, √(4 + 1/4) − 2 = 0.06 for two together. On one rod, edges count that are at least as far apart
-  along it as the model's own exclusion (`model.rod_surfaces`).
-- Surfaces are met by ribbons as they are (`testing.ribbons`), by balls and by the corners and rims of bodies
-  (`testing.surfaces`).
+- Ribbons are what they are (`testing.ribbons`), for each other and for surfaces. On one rod, edges count that are at
+  least as far apart along it as the model's own exclusion (`model.rod_surfaces`).
+- Surfaces are also met by balls and by the corners and rims of bodies (`testing.surfaces`).
 
 A look at the ends of a step cannot see what passed through something thin within it. So the straight way from the last
 look is gone through in parts, none of which moves anything by more than half of the smallest radius: what is deeper
@@ -29,7 +26,7 @@ from scipy.spatial.transform import Rotation
 
 from bilayer_core.model.model import Model
 from bilayer_core.observed.frame import Frame
-from bilayer_core.testing.ribbons import Ribbons
+from bilayer_core.testing.ribbons import Ribbons, Sheet
 from bilayer_core.testing.surfaces import BodyPoints, surfaces_of
 
 Array = np.ndarray
@@ -37,8 +34,6 @@ MOST_PAIRS = 45_000
 """Pairs of edges that every step is checked for: those of 300 nodes."""
 MOST_EDGES = 2000
 """Of which all pairs are listed."""
-MOST_TOGETHER = 20_000
-"""Points whose distances from edges are found at a time."""
 MOST_PARTS = 24
 """Into which the way of a step is cut at most."""
 LARGEST_TURN = 0.3
@@ -51,8 +46,7 @@ DEEP = 0.5
 class Moment:
     """Where everything is at one time."""
 
-    nodes: Array  # of rods [m], shape (n_node, 3)
-    sections: Array  # of ribbons: `Ribbons.sections`
+    sections: Array  # of ribbons: `Ribbons.sections`, shape (2, n_node, 3)
     points: Array  # of bodies, `BodyPoints` [m], shape (n_point, 3)
     surface_position: Array  # [m], shape (n_surface, 3)
     surface_rotation: Array  # columns are its axes, shape (n_surface, 3, 3)
@@ -69,27 +63,23 @@ class GapCheck:
 
     def __init__(self, model: Model):
         self._model = model
-        self._edge = model.rods.edge_node
         self._pairs = PairsOfEdges(model) if model.rod_search.exists else None
         self.every = max(1, math.ceil(self._pairs.count / MOST_PAIRS)) if self._pairs else 1
         self._points, self._ribbons = BodyPoints(model), Ribbons(model)
         self._surfaces = surfaces_of(model, self._points)
-        edge = self._ribbons.edge
+        edge = model.rods.edge_node
         self._meeting = [np.flatnonzero(of.nodes[edge] & of.nodes[edge + 1]) for of in self._surfaces]
-        self._edge_radius = model.rod_search.edge_radius
-        self._fractions = fractions_of_points(model)
         self._smallest_radius = float(self._ribbons.radius[model.node_length > 0.0].min())
         if self._pairs:
-            self._leave_out_joined()
+            self._leave_out_joined(self._ribbons.sections_of(model.start_position, model.start_director1))
         self._before: Moment | None = None
 
-    def _leave_out_joined(self) -> None:
+    def _leave_out_joined(self, start: Array) -> None:
         """Leave out pairs of edges that touch at the start, of rods that one body holds side by side."""
-        rods, start = self._model.rod_search, self._model.start_position
-        first, second = self._pairs.at(start)
+        rods, (first, second) = self._model.rod_search, self._pairs.at(start[0])
         joined = rods.rod_joined[rods.edge_rod[first], rods.edge_rod[second]]
-        gap, _ = self._rod_gaps(start)
-        self._pairs.leave_out(joined & (gap < self._model.scene.contact.barrier_distance))
+        gaps, _ = self._rod_gaps(self._ribbons.sheet(start), first, second)
+        self._pairs.leave_out(start[0], joined & (gaps < self._model.scene.contact.barrier_distance))
 
     @property
     def checks_anything(self) -> bool:
@@ -104,8 +94,7 @@ class GapCheck:
         ]
         poses.append((np.zeros(3), np.eye(3)))  # the world
         return Moment(
-            frame.positions[: self._model.node_count],
-            self._ribbons.sections(frame) if self._surfaces else np.empty((2, 0, 3)),
+            self._ribbons.sections(frame),
             self._points.places(frame),
             np.array([poses[s.body][0] + poses[s.body][1] @ s.position for s in self._surfaces]).reshape(-1, 3),
             np.array([poses[s.body][1] @ s.rotation for s in self._surfaces]).reshape(-1, 3, 3),
@@ -113,10 +102,13 @@ class GapCheck:
 
     def smallest(self, at: Moment) -> float:
         """Return the smallest gap [m]; infinite if nothing can meet."""
-        gaps = [math.inf]
+        sheet, gaps = self._ribbons.sheet(at.sections), [math.inf]
         if self._pairs:
-            gaps.append(float(self._rod_gaps(at.nodes)[0].min(initial=math.inf)))
-        return min(gaps + self._surface_gaps(at, math.inf))
+            unit, (first, second) = self._model.scene.contact.barrier_distance, self._pairs.at(at.sections[0])
+            bound, _ = sheet.apart_at_least(first, second)
+            near = bound < unit
+            gaps += [float(bound[~near].min(initial=math.inf)), sheet.apart(first[near], second[near], unit, unit)]
+        return min(gaps + self._surface_gaps(sheet, at, math.inf))
 
     def crossed(self, at: Moment) -> str:
         """Describe a deep overlap on the straight way from the last look to this one; empty if there was none."""
@@ -126,32 +118,34 @@ class GapCheck:
         turns = zip(before.surface_rotation, at.surface_rotation, strict=True)
         if max((_angle(one.T @ other) for one, other in turns), default=0.0) > LARGEST_TURN:
             return ""
-        rods = _parts(_largest(at.nodes - before.nodes), self._smallest_radius) if self._pairs else 0
+        moved = at.sections - before.sections
+        rods = _parts(_largest(moved[0]) + _largest(moved[1]), self._smallest_radius) if self._pairs else 0
         points, positions = at.points - before.points, at.surface_position - before.surface_position
-        sections = at.sections - before.sections
         surfaces = [
-            _parts(max(_largest(points[of.points] - way), self._way(sections[:, of.nodes], way)), of.smallest)
+            _parts(max(_largest(points[of.points] - way), self._way(moved[:, of.nodes], way)), of.smallest)
             for of, way in zip(self._surfaces, positions, strict=True)
         ]
         ends = list(zip(vars(before).values(), vars(at).values(), strict=True))
         for part in np.linspace(0.0, 1.0, max([rods, *surfaces]) + 1)[1:-1]:
             between = Moment(*(a + part * (b - a) for a, b in ends))
-            if found := self._deep(between, at.nodes - before.nodes, rods > 1, [parts > 1 for parts in surfaces]):
+            if found := self._deep(between, moved[0], rods > 1, [parts > 1 for parts in surfaces]):
                 return found
         return ""
 
     def _deep(self, at: Moment, way: Array, with_rods: bool, with_surfaces: list[bool]) -> str:
         """Describe a deep overlap of nodes that move by `way` [m] from look to look; empty if there is none."""
+        sheet = self._ribbons.sheet(at.sections)
         if with_rods:
-            gap, radii = self._rod_gaps(at.nodes)
-            deep = np.flatnonzero(gap < -DEEP * radii)
+            first, second = self._pairs.at(at.sections[0])
+            gaps, radii = self._rod_gaps(sheet, first, second)
+            deep = np.flatnonzero(gaps < -DEEP * radii)
             if deep.size:
-                first, second = (edges[deep] for edges in self._pairs.at(at.nodes))
-                middle = 0.5 * (way[self._edge] + way[self._edge + 1])
+                first, second = first[deep], second[deep]
+                middle = 0.5 * (way[:-1] + way[1:])[self._model.rods.edge_node]
                 against = np.linalg.norm(middle[first] - middle[second], axis=1)
                 if (2.0 * against <= self._pairs.length_between(first, second)).any():
                     return "a rod passed through a rod"
-        gaps = self._surface_gaps(at, 0.0) if any(with_surfaces) else []
+        gaps = self._surface_gaps(sheet, at, 0.0) if any(with_surfaces) else []
         for surface, gap, wanted in zip(self._surfaces, gaps, with_surfaces, strict=False):
             if wanted and gap < -DEEP * surface.smallest:
                 return f"something passed through {surface.name}"
@@ -163,38 +157,16 @@ class GapCheck:
         middle, half = sections
         return _largest(middle - way) + _largest(half)
 
-    def _rod_gaps(self, nodes: Array) -> tuple[Array, Array]:
-        """Gap of each pair of edges, or a lower bound where that is above the barrier distance, and their radii [m]."""
-        edge, (first, second) = self._edge, self._pairs.at(nodes)
-        begin, end = nodes[edge], nodes[edge + 1]
-        middle, half = 0.5 * (begin + end), 0.5 * np.linalg.norm(end - begin, axis=1)
-        radii = self._edge_radius[first] + self._edge_radius[second]
-        bound = np.linalg.norm(middle[first] - middle[second], axis=1) - half[first] - half[second] - radii
+    def _rod_gaps(self, sheet: Sheet, first: Array, second: Array) -> tuple[Array, Array]:
+        """Gap of each pair of edges, as if they were flat, or a lower bound above the barrier distance; their radii."""
+        bound, radii = sheet.apart_at_least(first, second)
         near = np.flatnonzero(bound < self._model.scene.contact.barrier_distance)
-        if near.size:
-            one, other = first[near], second[near]
-            for a, b in ((one, other), (other, one)):
-                apart = self._from_points(begin, end, a, b) - radii[near]
-                bound[near] = apart if a is one else np.minimum(bound[near], apart)
+        bound[near] = sheet.apart_if_flat(first[near], second[near]) - radii[near]
         return bound, radii
 
-    def _from_points(self, begin: Array, end: Array, a: Array, b: Array) -> Array:
-        """Smallest distance of the points on each edge of `a` from the edge of `b` beside it [m]."""
-        smallest = np.full(len(a), math.inf)
-        together = max(1, MOST_TOGETHER // len(a))
-        for first in range(0, self._fractions.shape[1], together):
-            own = self._fractions[a, first : first + together, None]
-            points = (1.0 - own) * begin[a, None] + own * end[a, None]
-            segments = (np.repeat(nodes[b], own.shape[1], axis=0) for nodes in (begin, end))
-            distances = from_segment(points.reshape(-1, 3), *segments).reshape(len(a), -1)
-            smallest = np.fmin(smallest, np.fmin.reduce(distances, axis=1))
-        return smallest
-
-    def _surface_gaps(self, at: Moment, enough: float) -> list[float]:
+    def _surface_gaps(self, sheet: Sheet, at: Moment, enough: float) -> list[float]:
         """Return the least gap of all that can meet each surface [m]; of ribbons, that it is not below `enough`."""
-        if not self._surfaces:
-            return []
-        sheet, found = self._ribbons.sheet(at.sections), []
+        found = []
         for number, surface in enumerate(self._surfaces):
             place = at.surface_position[number], at.surface_rotation[number]
             of_bodies = surface.distance((at.points[surface.points] - place[0]) @ place[1]) - surface.radii
@@ -202,13 +174,6 @@ class GapCheck:
             of_ribbons = sheet.least_gap(self._meeting[number], surface, place, unit, enough)
             found.append(min(of_ribbons, float(of_bodies.min(initial=math.inf))))
         return found
-
-
-def from_segment(p: Array, a: Array, b: Array) -> Array:
-    """Distance of points p from segments ab [m], each of shape (n, 3), to (n,)."""
-    along = b - a
-    t = np.clip(((p - a) * along).sum(1) / np.maximum((along * along).sum(1), 1e-300), 0.0, 1.0)
-    return np.linalg.norm(p - a - t[:, None] * along, axis=1)
 
 
 def _parts(way: float, size: float) -> int:
@@ -256,16 +221,16 @@ class PairsOfEdges:
             return self._all
         edge = self._model.rods.edge_node
         middle, along = 0.5 * (nodes[edge] + nodes[edge + 1]), nodes[edge + 1] - nodes[edge]
-        reach = np.linalg.norm(along, axis=1).max() + 2.0 * self._model.rod_search.edge_radius.max()
+        reach = np.linalg.norm(along, axis=1).max() + 2.0 * max(float(s.width.max()) for s in self._model.strands)
         reach += self._model.scene.contact.barrier_distance
         near = KDTree(middle).query_pairs(reach, output_type="ndarray")
         first, second = self._allowed(near[:, 0], near[:, 1])
         keep = ~np.isin(self._number(first, second), self._left_out)
         return first[keep], second[keep]
 
-    def leave_out(self, out: Array) -> None:
-        """Leave out pairs, of those at the start, from now on."""
-        first, second = self.at(self._model.start_position)
+    def leave_out(self, start: Array, out: Array) -> None:
+        """Leave out pairs, of those with nodes at the start [m], from now on."""
+        first, second = self.at(start)
         if self._all is not None:
             self._all = first[~out], second[~out]
         else:
@@ -293,15 +258,3 @@ class PairsOfEdges:
         far = around - 0.5 * (edge[first] + edge[second]) >= surfaces.rod_exclusion[rod_a]
         keep = surfaces.rod_can_collide[rod_a, rod_b] & (~same | far)
         return first[keep], second[keep]
-
-
-def fractions_of_points(model: Model) -> Array:
-    """Where the points of each edge are on it, 0 … 1, shape (n_edge, most points of an edge); NaN beyond the last."""
-    rods = model.rod_search
-    if not rods.exists:
-        return np.empty((0, 0))
-    counts = np.diff(rods.first_point)
-    found = np.full((len(counts), int(counts.max())), math.nan)
-    for edge, (first, count) in enumerate(zip(rods.first_point, counts, strict=False)):
-        found[edge, :count] = rods.point_fraction[first : first + count]
-    return found

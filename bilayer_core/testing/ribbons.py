@@ -19,6 +19,7 @@ import numpy as np
 
 from bilayer_core.model.model import Model
 from bilayer_core.observed.frame import Frame
+from bilayer_core.testing.rectangles import Rectangles, apart
 from bilayer_core.testing.surfaces import MetSurface
 
 Array = np.ndarray
@@ -35,33 +36,33 @@ class Ribbons:
 
     Attributes
     ----------
-    edge : Array
-        First node of each stretch between two stations, shape (n_edge,).
+    radius : Array
+        Half the thickness at each node [m], shape (n_node,).
     """
 
     def __init__(self, model: Model):
         self._model, nodes = model, model.node_count
         self.radius, self._reach, self._offset = np.zeros((3, nodes))
-        edges = []
         for strand in model.strands:
             own = slice(strand.first_node, strand.first_node + strand.node_count)
             self.radius[own], self._offset[own] = 0.5 * strand.thickness, strand.offset
             if not model.plane.exists:
                 self._reach[own] = np.maximum(0.5 * strand.width - self.radius[own], 0.0)
-            edges.append(np.arange(strand.first_node, strand.last_node if not strand.closed else own.stop - 2))
-        self.edge = np.concatenate(edges)
         self._length = np.linalg.norm(np.diff(model.start_position[:nodes], axis=0), axis=1)[:, None]
 
     def sections(self, frame: Frame) -> Array:
         """Return c and a of each node [m], shape (2, n_node, 3)."""
-        model, nodes = self._model, self._model.node_count
-        position, first = frame.positions[:nodes], model.rods.edge_node
+        return self.sections_of(frame.positions[: self._model.node_count], frame.directors)
+
+    def sections_of(self, position: Array, director1: Array) -> Array:
+        """Return c and a by positions of nodes [m] and m1 of edges."""
+        model, nodes, first = self._model, self._model.node_count, self._model.rods.edge_node
         tangent = position[first + 1] - position[first]
         tangent /= np.linalg.norm(tangent, axis=1)[:, None]
         m1, m2 = np.zeros((2, nodes, 3))
         for node in (first, first + 1):
-            np.add.at(m1, node, frame.directors)
-            np.add.at(m2, node, np.cross(tangent, frame.directors))
+            np.add.at(m1, node, director1)
+            np.add.at(m2, node, np.cross(tangent, director1))
         for strand in model.strands:
             if strand.closed:
                 begin, end = strand.first_node, strand.first_node + strand.node_count - 2
@@ -85,16 +86,17 @@ class Ribbons:
                 if last > first + 1:
                     slope[:, first] += 0.5 * (secant[:, first] - slope[:, first + 1])
                     slope[:, last] += 0.5 * (secant[:, last - 1] - slope[:, last - 1])
-        third = self._length[self.edge] / 3.0
-        begin, end = sections[:, self.edge], sections[:, self.edge + 1]
-        inner = begin + third * slope[:, self.edge], end - third * slope[:, self.edge + 1]
+        first = self._model.rods.edge_node
+        third = self._length[first] / 3.0
+        begin, end = sections[:, first], sections[:, first + 1]
+        inner = begin + third * slope[:, first], end - third * slope[:, first + 1]
         points = np.stack([begin, *inner, end], axis=2)
-        return Sheet(points, np.stack([self.radius[self.edge], self.radius[self.edge + 1]], axis=1))
+        return Sheet(points, np.stack([self.radius[first], self.radius[first + 1]], axis=1))
 
 
 @dataclass(frozen=True)
 class Sheet:
-    """Bézier points of c and a of each stretch [m], shape (2, n_edge, 4, 3), and its radii at both ends [m]."""
+    """Bézier points of c and a of each edge [m], shape (2, n_edge, 4, 3), and its radii at both ends [m]."""
 
     points: Array
     radius: Array
@@ -152,3 +154,72 @@ class Sheet:
             across = np.concatenate([across - moved[1], across + moved[1]])
             edge, step, half = (np.tile(of, 2) for of in (edge, step, half))
         return least
+
+    def flat(self, edge: Array, along: Array, across: Array, step: Array, half: Array) -> tuple[Rectangles, Array]:
+        """Return rectangles that touch the sheet in the middles of pieces, and how far these are askew [m]."""
+        middle, _ = self.at(edge, along, across)
+        rest, (c, a) = 1.0 - along, np.diff(self.points[:, edge], axis=2)
+        weight = 3.0 * np.stack([rest**2, 2.0 * rest * along, along**2], axis=-1)
+        one = np.einsum("ncd,nc->nd", c, weight) + across[:, None] * np.einsum("ncd,nc->nd", a, weight)
+        other = self.at(edge, along, across + 1.0)[0] - middle
+        size = np.maximum((other**2).sum(axis=1), 1e-300)
+        askew = ((one * other).sum(axis=1) / size)[:, None] * other
+        sides = np.stack([step[:, None] * (one - askew), half[:, None] * other], axis=1)
+        return Rectangles(middle, sides), step * np.linalg.norm(askew, axis=1)
+
+    def apart_at_least(self, first: Array, second: Array) -> tuple[Array, Array]:
+        """Return a lower bound of the gap of each pair of edges, and the sum of their radii [m]."""
+        along_way, across_way, _, _ = self.ways()
+        edges = np.arange(len(self.radius))
+        middle, _ = self.at(edges, np.full(len(edges), 0.5), np.zeros(len(edges)))
+        size, radius = 0.5 * along_way + across_way, self.radius.max(axis=1)
+        radii = radius[first] + radius[second]
+        return np.linalg.norm(middle[first] - middle[second], axis=1) - size[first] - size[second] - radii, radii
+
+    def apart_if_flat(self, first: Array, second: Array) -> Array:
+        """Return the distance of the middle sheets of each pair of edges as if these were flat [m]."""
+        flat = []
+        for edge in (first, second):
+            half = np.full(len(edge), 0.5)
+            flat.append(self.flat(edge, half, 0.0 * half, half, 2.0 * half)[0])
+        return apart(*flat)
+
+    def apart(self, first: Array, second: Array, unit: float, enough: float) -> float:
+        """Return the least gap between pairs of stretches [m], or a lower bound if that is above `enough`."""
+        _, across_way, bend, turn = self.ways()
+        pieces = []
+        for edge in (first, second):
+            wide = np.where(across_way[edge] > 0.0, 1.0, 0.0)
+            pieces.append([edge, np.full(len(edge), 0.5), np.zeros(len(edge)), np.full(len(edge), 0.5), wide])
+        least = bound = math.inf
+        while pieces[0][0].size:
+            flat, left, radii = [], [], np.zeros(pieces[0][0].size)
+            for edge, along, across, step, half in pieces:
+                rectangles, askew = self.flat(edge, along, across, step, half)
+                flat.append(rectangles)
+                ends = self.radius[edge]
+                radii += (1.0 - along) * ends[:, 0] + along * ends[:, 1]
+                left.append(0.5 * bend[edge] * step**2 + turn[edge] * step * half + askew)
+                left[-1] += step * np.abs(ends[:, 1] - ends[:, 0])
+            gaps, off = apart(*flat) - radii, left[0] + left[1]
+            least = min(least, float((gaps + off).min()))
+            go_on = (gaps - off < min(least, enough)) & (off > FINE * unit)
+            bound = min(bound, float((gaps - off)[~go_on].min(initial=math.inf)))
+            pieces = [[of[go_on] for of in piece] for piece in pieces]
+            longer = (left[0] >= left[1])[go_on]
+            pieces = [_halved(piece, chosen) for piece, chosen in zip(pieces, (longer, ~longer), strict=True)]
+        return bound
+
+
+def _halved(piece: list[Array], chosen: Array) -> list[Array]:
+    """Return pieces twice, the chosen ones as their two halves along."""
+    edge, along, across, step, half = piece
+    step = np.where(chosen, 0.5 * step, step)
+    moved = np.where(chosen, step, 0.0)
+    return [
+        np.tile(edge, 2),
+        np.concatenate([along - moved, along + moved]),
+        np.tile(across, 2),
+        np.tile(step, 2),
+        np.tile(half, 2),
+    ]

@@ -8,7 +8,7 @@ import pytest
 
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
-from bilayer_core.testing.gaps import GapCheck, PairsOfEdges, from_segment
+from bilayer_core.testing.gaps import GapCheck, PairsOfEdges
 from bilayer_core.verification.stress.matrix import matrix
 from bilayer_core.verification.stress.robots import scene_of
 
@@ -18,13 +18,6 @@ def simulator_of(name):
     simulator = Simulator(load_scene(scene_of(case.parameters)))
     simulator.compile()
     return simulator
-
-
-def test_distance_from_a_segment_is_that_of_a_dense_search():
-    p, a, b = np.random.default_rng(3).normal(size=(3, 50, 3))
-    part = np.linspace(0.0, 1.0, 2001)[:, None, None]
-    dense = np.linalg.norm(a + part * (b - a) - p, axis=2).min(axis=0)
-    np.testing.assert_allclose(from_segment(p, a, b), dense, rtol=1e-5)
 
 
 @pytest.mark.parametrize("model", ["laminate", "two_rod"])
