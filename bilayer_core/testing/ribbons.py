@@ -140,6 +140,8 @@ class Sheet:
             local = (x - place[0]) @ place[1]
             gaps = (surface.distance(local) - radius).reshape(LOOKED_AT.shape[1], -1)
             least = min(least, float(gaps.min()))
+            if least < -unit:
+                break
             way = along_way[edge] * step, across_way[edge] * half
             reach = way[0] + way[1]
             left = 0.5 * surface.bend(local[: edge.size], reach) * reach**2
@@ -203,6 +205,8 @@ class Sheet:
                 left[-1] += step * np.abs(ends[:, 1] - ends[:, 0])
             gaps, off = apart(*flat) - radii, left[0] + left[1]
             least = min(least, float((gaps + off).min()))
+            if least < -unit:  # deep inside: how deep is no question
+                return least
             go_on = (gaps - off < min(least, enough)) & (off > FINE * unit)
             bound = min(bound, float((gaps - off)[~go_on].min(initial=math.inf)))
             pieces = [[of[go_on] for of in piece] for piece in pieces]
