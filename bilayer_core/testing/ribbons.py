@@ -2,7 +2,8 @@
 
 A ribbon is its middle sheet c(s) + u a(s), −1 ≤ u ≤ 1, about which half the thickness lies on all sides. c is the
 middle between the outer faces, and a reaches along m2 to half the width less half the thickness. Between stations both
-are cubics; their slope at a station is that of the parabola through it and its two neighbours.
+are cubics; their slope at a station is that of the parabola through it and its two neighbours, but where the chain
+turns by more than 60 degrees: there the curve has a corner.
 
 `least_gap` halves pieces of the sheet. A piece goes once no point of it can be nearer to the surface than what was
 found: distances change by no more than the way, and from those of its corners by no more than ½ k way² + e where the
@@ -27,6 +28,8 @@ FINE = 0.02
 """Part of the barrier distance to which gaps are found."""
 SMALLEST = 0.05
 """Part of the barrier distance below which pieces are not halved."""
+KINK = 0.5
+"""Cosine of the turn at a station below which the curve has a corner there."""
 LOOKED_AT = np.array([(0, -1, -1, 1, 1), (0, -1, 1, -1, 1)], dtype=float)[:, :, None]
 """Places on a piece in half lengths, along and across, its middle first."""
 
@@ -86,10 +89,14 @@ class Ribbons:
                 if last > first + 1:
                     slope[:, first] += 0.5 * (secant[:, first] - slope[:, first + 1])
                     slope[:, last] += 0.5 * (secant[:, last - 1] - slope[:, last - 1])
-        first = self._model.rods.edge_node
+        first, (along, _) = self._model.rods.edge_node, secant / np.linalg.norm(secant[0], axis=1)[:, None]
+        kink = np.append(np.append(False, (along[1:] * along[:-1]).sum(axis=1) < KINK), False)[:, None]
         third = self._length[first] / 3.0
         begin, end = sections[:, first], sections[:, first + 1]
-        inner = begin + third * slope[:, first], end - third * slope[:, first + 1]
+        inner = (
+            begin + third * np.where(kink[first], secant[:, first], slope[:, first]),
+            end - third * np.where(kink[first + 1], secant[:, first], slope[:, first + 1]),
+        )
         points = np.stack([begin, *inner, end], axis=2)
         return Sheet(points, np.stack([self.radius[first], self.radius[first + 1]], axis=1))
 

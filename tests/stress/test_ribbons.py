@@ -43,4 +43,7 @@ def test_the_least_gap_is_that_of_a_dense_search(kind, seed):
     x, radius = sheet.at(*(of.ravel() for of in grid))
     dense = (surface.distance((x - place[0]) @ place[1]) - radius).min()
     found = sheet.least_gap(np.arange(STRETCHES), surface, place, UNIT, np.inf)
-    assert dense - LENGTH / STRETCHES / 50 < found < dense + FINE * UNIT
+    if dense < -UNIT:  # how deep it is, is not looked for
+        assert dense - LENGTH / STRETCHES / 50 < found < -UNIT
+    else:
+        assert dense - LENGTH / STRETCHES / 50 < found < dense + FINE * UNIT
