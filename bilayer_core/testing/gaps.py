@@ -4,9 +4,13 @@ Nothing here is shared with the solver but the geometry of the scene: what has w
 half edges. All pairs are looked at, without lists of near ones, but for robots of thousands of edges, whose near pairs
 scipy's k-d tree finds anew at every look; distances are computed by other formulas.
 
-- Ribbons are what they are (`testing.ribbons`), for each other and for surfaces. On one rod, edges count that are at
-  least as far apart along it as the model's own exclusion (`model.rod_surfaces`).
-- Surfaces are also met by balls and by the corners and rims of bodies (`testing.surfaces`).
+- Surfaces are met by ribbons as they are (`testing.ribbons`), but half spaces by their stations alone, as the model has
+  it; rods by rods as round ones about the middle between their faces. On one rod, edges count that are at least as far
+  apart along it as the model's own exclusion (`model.rod_surfaces`).
+- Surfaces are met by balls and by the corners and rims of bodies (`testing.surfaces`).
+
+Between stations the shape of a chain is known only so far: a gap down to −`UNSURE` of the barrier distance is none that
+is closed.
 
 A look at the ends of a step cannot see what passed through something thin within it. So the straight way from the last
 look is gone through in parts, none of which moves anything by more than half of the smallest radius: what is deeper
@@ -38,6 +42,8 @@ MOST_PARTS = 24
 """Into which the way of a step is cut at most."""
 LARGEST_TURN = 0.3
 """Of a surface from look to look [rad], up to which straight lines stand for the ways about it."""
+UNSURE = 0.05
+"""Part of the barrier distance that points of the model leave between them."""
 DEEP = 0.5
 """Part of a radius, or of a half edge, from which on something is inside."""
 
@@ -78,7 +84,7 @@ class GapCheck:
         """Leave out pairs of edges that touch at the start, of rods that one body holds side by side."""
         rods, (first, second) = self._model.rod_search, self._pairs.at(start[0])
         joined = rods.rod_joined[rods.edge_rod[first], rods.edge_rod[second]]
-        gaps, _ = self._rod_gaps(self._ribbons.sheet(start), first, second)
+        gaps, _ = self._rod_gaps(self._ribbons.sheet(start).narrow(), first, second)
         self._pairs.leave_out(start[0], joined & (gaps < self._model.scene.contact.barrier_distance))
 
     @property
@@ -104,10 +110,11 @@ class GapCheck:
         """Return the smallest gap [m]; infinite if nothing can meet."""
         sheet, gaps = self._ribbons.sheet(at.sections), [math.inf]
         if self._pairs:
+            cores = sheet.narrow()
             unit, (first, second) = self._model.scene.contact.barrier_distance, self._pairs.at(at.sections[0])
-            bound, _ = sheet.apart_at_least(first, second)
+            bound, _ = cores.apart_at_least(first, second)
             near = bound < unit
-            gaps += [float(bound[~near].min(initial=math.inf)), sheet.apart(first[near], second[near], unit, unit)]
+            gaps += [float(bound[~near].min(initial=math.inf)), cores.apart(first[near], second[near], unit, unit)]
         return min(gaps + self._surface_gaps(sheet, at, math.inf))
 
     def crossed(self, at: Moment) -> str:
@@ -137,7 +144,7 @@ class GapCheck:
         sheet = self._ribbons.sheet(at.sections)
         if with_rods:
             first, second = self._pairs.at(at.sections[0])
-            gaps, radii = self._rod_gaps(sheet, first, second)
+            gaps, radii = self._rod_gaps(sheet.narrow(), first, second)
             deep = np.flatnonzero(gaps < -DEEP * radii)
             if deep.size:
                 first, second = first[deep], second[deep]

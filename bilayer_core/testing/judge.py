@@ -2,7 +2,7 @@
 
 ========================= =====================================================================================
 finite                    positions and velocities are numbers
-gap                       the smallest gap is above zero, and nothing passed through anything (`testing.gaps`)
+gap                       the smallest gap is open, and nothing passed through anything (`testing.gaps`)
 energy without driving    T + V can only fall: it rises by no more than `MOST_GAIN` of the largest energy
 energy with driving       T + V less supplied work can only fall, but for the quadrature of that work: it rises by no
                           more than `MOST_MADE` of the largest energy of the run
@@ -24,7 +24,7 @@ from bilayer_core.errors import BilayerError
 from bilayer_core.observed.frame import Frame
 from bilayer_core.scene.body import Guided
 from bilayer_core.simulation.simulator import Simulator
-from bilayer_core.testing.gaps import GapCheck
+from bilayer_core.testing.gaps import UNSURE, GapCheck
 
 MOST_GAIN = 2e-3
 """The engine stops at 1e-3; rounding and Newton's tolerance are beside it."""
@@ -105,7 +105,7 @@ class Judge:
             return
         moment = self._gaps.moment(frame)
         self.min_gap = min(self.min_gap, self._gaps.smallest(moment))
-        if not self.min_gap > 0.0:
+        if not self.min_gap > -UNSURE * self._simulator.scene.contact.barrier_distance:
             own = f"the engine's own {frame.min_gap:.3g} m"
             raise Verdict(f"the smallest gap is {self.min_gap:.3g} m, {own}", frame.time)
         if found := self._gaps.crossed(moment):
