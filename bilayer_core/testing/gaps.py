@@ -9,8 +9,8 @@ scipy's k-d tree finds anew at every look; distances are computed by other formu
   apart along it as the model's own exclusion (`model.rod_surfaces`).
 - Surfaces are met by balls and by the corners and rims of bodies (`testing.surfaces`).
 
-Between stations the shape of a chain is known only so far: a gap down to −`UNSURE` of the barrier distance is none that
-is closed.
+The model keeps points apart, not all between them: surfaces may be nearer than it knows by `UNSURE` of the barrier
+distance, and rods, whose points are no farther apart than their radius, by √(4 + 1/4) − 2 of that where two cross.
 
 A look at the ends of a step cannot see what passed through something thin within it. So the straight way from the last
 look is gone through in parts, none of which moves anything by more than half of the smallest radius: what is deeper
@@ -42,8 +42,8 @@ MOST_PARTS = 24
 """Into which the way of a step is cut at most."""
 LARGEST_TURN = 0.3
 """Of a surface from look to look [rad], up to which straight lines stand for the ways about it."""
-UNSURE = 0.05
-"""Part of the barrier distance that points of the model leave between them."""
+UNSURE = 0.05, math.sqrt(4.25) - 2.0
+"""Part of the barrier distance, and of the radius of rods, by which things may be nearer than points of the model."""
 DEEP = 0.5
 """Part of a radius, or of a half edge, from which on something is inside."""
 
@@ -65,6 +65,8 @@ class GapCheck:
     ----------
     every : int
         Number of steps from one look to the next: 1 but for scenes with very many pairs.
+    unsure : float
+        By how much the smallest gap may be less than what the model knows [m].
     """
 
     def __init__(self, model: Model):
@@ -78,6 +80,10 @@ class GapCheck:
         self._smallest_radius = float(self._ribbons.radius[model.node_length > 0.0].min())
         if self._pairs:
             self._leave_out_joined(self._ribbons.sections_of(model.start_position, model.start_director1))
+        contact = model.scene.contact
+        self.unsure = UNSURE[0] * contact.barrier_distance if contact is not None else 0.0
+        if self._pairs:
+            self.unsure = max(self.unsure, UNSURE[1] * float(self._ribbons.radius.max()))
         self._before: Moment | None = None
 
     def _leave_out_joined(self, start: Array) -> None:

@@ -24,7 +24,7 @@ from bilayer_core.errors import BilayerError
 from bilayer_core.observed.frame import Frame
 from bilayer_core.scene.body import Guided
 from bilayer_core.simulation.simulator import Simulator
-from bilayer_core.testing.gaps import UNSURE, GapCheck
+from bilayer_core.testing.gaps import GapCheck
 
 MOST_GAIN = 2e-3
 """The engine stops at 1e-3; rounding and Newton's tolerance are beside it."""
@@ -105,7 +105,7 @@ class Judge:
             return
         moment = self._gaps.moment(frame)
         self.min_gap = min(self.min_gap, self._gaps.smallest(moment))
-        if not self.min_gap > -UNSURE * self._simulator.scene.contact.barrier_distance:
+        if not self.min_gap > -self._gaps.unsure:
             own = f"the engine's own {frame.min_gap:.3g} m"
             raise Verdict(f"the smallest gap is {self.min_gap:.3g} m, {own}", frame.time)
         if found := self._gaps.crossed(moment):
