@@ -5,9 +5,9 @@ half edges. All pairs are looked at, without lists of near ones, but for robots 
 scipy's k-d tree finds anew at every look; distances are computed by other formulas.
 
 - Surfaces are met by ribbons as they are (`testing.ribbons`), but half spaces by their stations alone, as the model has
-  it; rods by rods as round ones about the middle between their faces. On one rod, edges count that are at least as far
-  apart along it as the model's own exclusion (`model.rod_surfaces`).
-- Surfaces are met by balls and by the corners and rims of bodies (`testing.surfaces`).
+  it; by balls, and by the corners and rims of bodies (`testing.surfaces`).
+- Rods meet rods as round ones about the middle between their faces, straight between stations. On one rod, edges count
+  that are at least as far apart along it as the model's own exclusion (`model.rod_surfaces`).
 
 The model keeps points apart, not all between them: surfaces may be nearer than it knows by `UNSURE` of the barrier
 distance, and rods, whose points are no farther apart than their radius, by √(4 + 1/4) − 2 of that where two cross.
@@ -90,7 +90,7 @@ class GapCheck:
         """Leave out pairs of edges that touch at the start, of rods that one body holds side by side."""
         rods, (first, second) = self._model.rod_search, self._pairs.at(start[0])
         joined = rods.rod_joined[rods.edge_rod[first], rods.edge_rod[second]]
-        gaps, _ = self._rod_gaps(self._ribbons.sheet(start).narrow(), first, second)
+        gaps, _ = self._rod_gaps(self._ribbons.sheet(start).straight(), first, second)
         self._pairs.leave_out(start[0], joined & (gaps < self._model.scene.contact.barrier_distance))
 
     @property
@@ -116,7 +116,7 @@ class GapCheck:
         """Return the smallest gap [m]; infinite if nothing can meet."""
         sheet, gaps = self._ribbons.sheet(at.sections), [math.inf]
         if self._pairs:
-            cores = sheet.narrow()
+            cores = sheet.straight()
             unit, (first, second) = self._model.scene.contact.barrier_distance, self._pairs.at(at.sections[0])
             bound, _ = cores.apart_at_least(first, second)
             near = bound < unit
@@ -150,7 +150,7 @@ class GapCheck:
         sheet = self._ribbons.sheet(at.sections)
         if with_rods:
             first, second = self._pairs.at(at.sections[0])
-            gaps, radii = self._rod_gaps(sheet.narrow(), first, second)
+            gaps, radii = self._rod_gaps(sheet.straight(), first, second)
             deep = np.flatnonzero(gaps < -DEEP * radii)
             if deep.size:
                 first, second = first[deep], second[deep]

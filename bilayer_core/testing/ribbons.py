@@ -108,9 +108,11 @@ class Sheet:
     points: Array
     radius: Array
 
-    def narrow(self) -> Sheet:
-        """Return the sheet without its width: what rods meet rods with."""
-        return Sheet(self.points * np.array([1.0, 0.0])[:, None, None, None], self.radius)
+    def straight(self) -> Sheet:
+        """Return the sheet without its width, straight between stations: what rods meet rods with."""
+        begin, end = self.points[:, :, :1], self.points[:, :, 3:]
+        straight = begin + np.linspace(0.0, 1.0, 4)[:, None] * (end - begin)
+        return Sheet(straight * np.array([1.0, 0.0])[:, None, None, None], self.radius)
 
     def at(self, edge: Array, along: Array, across: Array) -> tuple[Array, Array]:
         """Return places [m], shape (n, 3), and half thicknesses there [m], 0 ≤ along ≤ 1."""
