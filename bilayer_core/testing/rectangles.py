@@ -75,7 +75,7 @@ def _of_lines(a: Array, b: Array, c: Array, d: Array) -> Array:
 
 
 def _cut(one: Rectangles, other: Rectangles) -> Array:
-    """Whether a side of one goes through the inside of the other."""
+    """Return whether a side of one goes through the inside of the other."""
     corners, normal = one.corners - other.middle[:, None], np.cross(other.half[:, 0], other.half[:, 1])
     height = np.einsum("nkd,nd->nk", corners, normal)
     following, above = np.roll(corners, -1, axis=1), np.roll(height, -1, axis=1)
