@@ -198,11 +198,13 @@ def longest_edge(scene: SceneConfig, rod: Rod) -> float:
 def _of_points(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
     """Return how far apart a rod's contact points are for the surface that may sink deepest between them."""
     shaped = [(body.name, body.surface) for body in scene.bodies if body.surface is not None]
-    shaped += [(obstacle.name, obstacle) for obstacle in scene.obstacles if obstacle.type != "plane"]
+    shaped += [(obstacle.name, obstacle) for obstacle in scene.obstacles]
     radius, distance, worst = 0.5 * float(at_edges.thickness.min()), scene.contact.barrier_distance, None
     area = float(at_edges.width.max()) * rod.path.length
     for name, surface in shaped:
         demand = demand_of(shape_of(surface), area)
+        if demand[0] < 0.0:  # a plane
+            continue
         apart = spacing(demand, radius, distance)
         sag = apart**2 / (4.0 * (demand[0] + radius))
         if worst is None or sag > worst[0]:

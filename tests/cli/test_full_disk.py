@@ -32,14 +32,19 @@ def compiled():
     assert bilayer("run", "cantilever", "--duration", "2 ms", "--quiet").returncode == 0
 
 
+NO_BYTECODE = {"PYTHONDONTWRITEBYTECODE": "1"}
+"""Python would keep what it could write of it."""
+
+
 def with_room(size, *arguments):
     """Run ``bilayer`` where no file may have more than `size` bytes."""
 
     def limit():
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
+    variables = environment() | NO_BYTECODE
     return subprocess.run(
-        command(*arguments), env=environment(), capture_output=True, text=True, timeout=TIMEOUT, preexec_fn=limit
+        command(*arguments), env=variables, capture_output=True, text=True, timeout=TIMEOUT, preexec_fn=limit
     )
 
 
@@ -129,7 +134,7 @@ def test_a_command_names_the_file_that_found_no_room_and_nothing_else(here, log,
 
 
 def test_kernels_that_find_no_room_are_an_error_that_says_what_to_do(here):
-    variables = {"NUMBA_CACHE_DIR": str(here), "BILAYER_JIT_AHEAD": "0"}
+    variables = {"NUMBA_CACHE_DIR": str(here), "BILAYER_JIT_AHEAD": "0"} | NO_BYTECODE
 
     def limit():
         resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
