@@ -28,7 +28,7 @@ sys.meta_path.insert(0, Finder())
 """
 WHILE_COMPILING = """
 from bilayer_sim_ros.node import simulation_run
-def compile_for_long(report):
+def compile_for_long(report, needed):
     send()
     time.sleep(60.0)
 simulation_run.ensure_compiled = compile_for_long
