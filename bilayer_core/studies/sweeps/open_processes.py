@@ -35,6 +35,7 @@ OPEN_CLUSTER = (
 )
 CONFIG = {
     "distributed.scheduler.allowed-failures": 0,  # who dies is counted here
+    "distributed.deploy.lost-worker-timeout": 1e9,  # [s] a process that dies is replaced, however long that takes
     "distributed.worker.memory.target": False,  # of what runs, nothing can be put to disk
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
