@@ -31,7 +31,7 @@ def about_mass_centre(simulator):
 
 @pytest.mark.parametrize("model", MODELS)
 @pytest.mark.parametrize("integrator", ["implicit_midpoint", "tr_bdf2"])
-def test_a_strip_that_spins_in_space_keeps_its_angular_momentum_at_the_order_of_the_integrator(model, integrator):
+def test_a_spinning_strip_keeps_its_angular_momentum_to_an_order(model, integrator):
     coarse, fine = (spun(model, integrator, dt) for dt in (5e-4, 2.5e-4))
     assert fine < 2e-6  # 2.7e-2 without the force, at any step
     assert np.log2(coarse / fine) > 1.8

@@ -43,7 +43,7 @@ def true_gap(simulator, ball, radius):
 
 
 @pytest.mark.parametrize("radius", [1e-3, 2e-2])
-def test_a_ball_that_is_pressed_into_a_strip_beside_its_points_stays_within_the_barrier_distance(radius):
+def test_a_ball_pressed_between_points_stays_within_the_barrier(radius):
     start = np.array([0.0131, 0.0041, radius + 0.5 * THICK + 1.5 * D_HAT])
     content = wide_strip({"shape": "sphere", "radius": radius}, (start, [0, 0, -3e-3]))
     simulator = Simulator(load_scene(content))

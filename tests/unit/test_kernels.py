@@ -54,7 +54,7 @@ def test_a_warm_run_compiles_nothing_and_loads_only_the_pieces_it_needs():
     assert not {"assemble_in_plane", "add_elasticity_in_plane", "adapt", "factor_5"} & set(loaded)
 
 
-def test_a_run_knows_its_pieces_before_it_starts_and_loads_no_library_that_it_does_not_need():
+def test_a_run_knows_its_pieces_and_loads_no_library_in_vain():
     *pieces, slow = _printed_by(NEEDED)
     needed, loaded = map(set, pieces)
     assert slow == []
