@@ -29,9 +29,9 @@ help:  ## Show what can be made.
 demo: $(STAMP)  ## Run the gripper: simulation node, controller, log, picture.
 	$(BIN)/python -m bilayer_sim_ros.demo
 
-test: $(TESTS)  ## Run every test, the slow ones as well.
+test: $(TESTS)  ## Run the tests, the slow ones as well.
 	command -v chromium >/dev/null || $(BIN)/playwright install --with-deps chromium
-	$(BIN)/python -m pytest -m "" -n $(JOBS) --dist worksteal
+	$(BIN)/python -m pytest -m "not verify" -n $(JOBS) --dist worksteal
 
 lint: $(TESTS)  ## Check the code's style, and the types of what programs call.
 	$(BIN)/ruff check .
@@ -47,7 +47,8 @@ stress: $(TESTS)  ## Run a hundred stress cases, about three minutes.
 	$(BIN)/bilayer stress --quick --no-shrink --out runs/stress_quick
 
 # What is found is committed: docs/stability.md with its figures, and the notes in docs/data that it shows.
-verify: bounds  ## Run what takes hours: bounds, all stress cases, 10,000 mutated scenes, 2,000 logs, 250 kills, a soak, films, seeded bugs.
+verify: bounds  ## Run what takes hours: long tests, bounds, all stress cases, 10,000 mutated scenes, 2,000 logs, 250 kills, a soak, films, seeded bugs.
+	$(BIN)/python -m pytest -m verify -n $(JOBS) --dist worksteal
 	FUZZ_SCENES=10000 FUZZ_SEED=7 $(BIN)/python -m pytest -m "" -n $(JOBS) tests/fuzz/test_mutated_scenes.py
 	FUZZ_LOGS=2000 FUZZ_STATES=1000 FUZZ_SEED=7 $(BIN)/python -m pytest -m "" -s tests/fuzz/test_mutated_logs.py
 	KILLS=200 KILLS_SEED=7 $(BIN)/python -m pytest -m "" -s tests/logs/test_kills.py
