@@ -30,7 +30,7 @@ import math
 from bilayer_core.contact.near import gap_normal, place_of
 from bilayer_core.contact.shapes import SPHERE
 from bilayer_core.jit import kernel
-from bilayer_core.jit.stack import stack_vector
+from bilayer_core.jit.called import stack_vector
 from bilayer_core.kinematics.vector import row
 
 KEPT_FRACTION = 0.1  # of each gap

@@ -10,8 +10,8 @@ import math
 
 from bilayer_core.engine.laws import value_of_span
 from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.called import stack_vector
 from bilayer_core.jit.record import Indices, Matrix, Stack, Vector, record
-from bilayer_core.jit.stack import stack_vector
 from bilayer_core.kinematics.rotating import rotate_by, spin_of
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import StageInputs

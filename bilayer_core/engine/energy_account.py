@@ -57,7 +57,7 @@ from bilayer_core.forces.added_mass import fluid_momentum, move_fluid
 from bilayer_core.forces.inertia import second_moment_beyond
 from bilayer_core.forces.raised import inertia_off_curve
 from bilayer_core.jit import kernel, piece
-from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.jit.called import stack_matrix
 from bilayer_core.kinematics.copying import copy
 from bilayer_core.kinematics.vector import row
 from bilayer_core.model.force_list import Kind, kinds

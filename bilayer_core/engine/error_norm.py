@@ -27,8 +27,8 @@ from __future__ import annotations
 import math
 
 from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.called import stack_vector
 from bilayer_core.jit.record import Indices, Vector, record
-from bilayer_core.jit.stack import stack_vector
 from bilayer_core.kinematics.rotating import rotation_vector_between
 from bilayer_core.model.records.step import StateArrays
 

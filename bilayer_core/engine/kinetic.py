@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bilayer_core.forces.raised import kinetic_energy_off_curve
 from bilayer_core.jit import kernel
-from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.jit.called import stack_matrix
 from bilayer_core.kinematics.rotating import inertia_tensor
 from bilayer_core.kinematics.vector import row
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-from numba import types
-
 from bilayer_core.engine.linear.assembly import expand_gradient
 from bilayer_core.engine.linear.attachments import condense_gradient
 from bilayer_core.forces.contact_on_bodies import condense_contact
@@ -16,16 +14,11 @@ from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Stage
 
-
-def _signature(result, *more):
-    """Return the signature of a piece of a force, which takes its own record first."""
-    records = (record.numba_type() for record in (Problem, Configuration, Stage))
-    return result(types.int64, *records, *more)
-
-
-call_add = caller("a force", lambda: _signature(types.float64, types.boolean))
-call_briefly = caller("the start or end of a force", lambda: _signature(types.int64))
-call_update_lagged = caller("a force that follows", lambda: _signature(types.boolean))
+_TAKES = (int, Problem, Configuration, Stage)
+"""What pieces of a force take first: the address of its own record, and what all forces see."""
+call_add = caller("a force", float, *_TAKES, bool)
+call_briefly = caller("the start or end of a force", int, *_TAKES)
+call_update_lagged = caller("a force that follows", bool, *_TAKES)
 
 
 @kernel

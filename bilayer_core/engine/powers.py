@@ -8,7 +8,7 @@ from bilayer_core.forces.bend_twist import bend_by_strains
 from bilayer_core.forces.rail_arms import write_rail_motions
 from bilayer_core.forces.rod_arms import add_step_of_arm, write_material_rate
 from bilayer_core.jit import kernel, piece
-from bilayer_core.jit.stack import stack_matrix, stack_vector
+from bilayer_core.jit.called import stack_matrix, stack_vector
 from bilayer_core.kinematics.rotating import inertia_tensor, solve_three
 from bilayer_core.kinematics.vector import cross, dot, row
 from bilayer_core.model.force_slots import slot_of

@@ -23,7 +23,7 @@ from bilayer_core.forces.mechanisms import measure_mechanisms
 from bilayer_core.forces.raised import copy_directors, measure_directors, predict_directors
 from bilayer_core.forces.restitution import measure_gaps
 from bilayer_core.jit import kernel, piece
-from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.jit.called import stack_matrix
 from bilayer_core.kinematics.copying import add_scaled, copy, copy_matrix, copy_row
 from bilayer_core.kinematics.rotating import inertia_tensor, rotate_by, rotation_vector_between, solve_three
 from bilayer_core.kinematics.vector import row

@@ -17,8 +17,7 @@ from bilayer_core.forces.mechanisms import measure_mechanisms, remember_mechanis
 from bilayer_core.forces.raised import measure_directors
 from bilayer_core.forces.restitution import measure_gaps
 from bilayer_core.jit import kernel, piece
-from bilayer_core.jit.flat import flat
-from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.jit.called import flat, stack_matrix
 from bilayer_core.kinematics.compensated import add_exactly
 from bilayer_core.kinematics.copying import copy, copy_matrix, copy_row
 from bilayer_core.kinematics.rotating import inertia_tensor, rotation_vector_between, solve_three

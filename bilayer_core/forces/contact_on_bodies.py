@@ -15,8 +15,8 @@ a rod has an arm from the node, x is the contact point at its end, and what it d
 from __future__ import annotations
 
 from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.called import stack_matrix
 from bilayer_core.jit.record import Matrix, Vector
-from bilayer_core.jit.stack import stack_matrix
 from bilayer_core.model.records.problem import Problem
 
 

@@ -30,7 +30,7 @@ from __future__ import annotations
 import math
 
 from bilayer_core.jit import kernel, piece
-from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.jit.called import stack_matrix
 from bilayer_core.kinematics.rotating import real_part
 from bilayer_core.model.force_slots import slot_of
 from bilayer_core.model.records.problem import Problem

@@ -34,8 +34,8 @@ from bilayer_core.forces.contact_on_bodies import add_force
 from bilayer_core.forces.joint_stiffness import across, scatter_pair, stiffness_of_joints
 from bilayer_core.forces.mechanisms import add_product, add_way
 from bilayer_core.jit import kernel, piece, record
+from bilayer_core.jit.called import stack_matrix, stack_vector
 from bilayer_core.jit.record import Flags, Indices, Matrix, Stack, Vector
-from bilayer_core.jit.stack import stack_matrix, stack_vector
 from bilayer_core.kinematics.vector import cross, dot
 from bilayer_core.model.force_slots import slot_of
 from bilayer_core.model.model import Model

@@ -29,7 +29,7 @@ import math
 from bilayer_core.forces.drag import mixed_directions
 from bilayer_core.forces.raised import director_moved
 from bilayer_core.jit import kernel, piece
-from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.jit.called import stack_matrix
 from bilayer_core.kinematics.vector import combine3
 from bilayer_core.model.force_slots import slot_of
 from bilayer_core.model.records.parts import Moments, PointForces

@@ -39,7 +39,7 @@ import numpy as np
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
 from bilayer_core.forces.joint_stiffness import across, scatter_pair, stiffness_of_joints
 from bilayer_core.jit import kernel, piece
-from bilayer_core.jit.stack import stack_matrix, stack_vector
+from bilayer_core.jit.called import stack_matrix, stack_vector
 from bilayer_core.kinematics.vector import cross, dot
 from bilayer_core.model.force_slots import slot_of
 from bilayer_core.model.free_motions import WORLD

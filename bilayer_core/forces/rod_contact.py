@@ -56,8 +56,8 @@ from bilayer_core.forces.rail_arms import (
     write_rail_slips,
 )
 from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.called import stack_vector
 from bilayer_core.jit.record import Matrix
-from bilayer_core.jit.stack import stack_vector
 from bilayer_core.model.force_slots import slot_of
 from bilayer_core.model.records.contacts import RodContact
 from bilayer_core.model.records.outcome import STATUS

@@ -30,7 +30,7 @@ from bilayer_core.forces.restitution import RESTITUTION, damping_at
 from bilayer_core.forces.rod_arms import add_to_edges, new_arm, write_curvature, write_material_rate
 from bilayer_core.forces.surface_pairs import list_surface_pairs
 from bilayer_core.jit import kernel, piece
-from bilayer_core.jit.stack import stack_matrix, stack_vector
+from bilayer_core.jit.called import stack_matrix, stack_vector
 from bilayer_core.model.force_slots import slot_of
 from bilayer_core.model.records.contacts import Surfaces
 from bilayer_core.model.records.problem import Problem

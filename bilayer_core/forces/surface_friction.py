@@ -52,7 +52,7 @@ from bilayer_core.forces.rod_arms import (
     write_rate,
 )
 from bilayer_core.jit import kernel, piece
-from bilayer_core.jit.stack import stack_matrix, stack_vector
+from bilayer_core.jit.called import stack_matrix, stack_vector
 from bilayer_core.kinematics.copying import copy_matrix
 from bilayer_core.kinematics.rotating import product_transposed
 from bilayer_core.kinematics.vector import row

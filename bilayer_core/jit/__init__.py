@@ -10,9 +10,10 @@ Two kinds of functions are compiled:
 
 from __future__ import annotations
 
+from bilayer_core.jit.called import caller, record_at
 from bilayer_core.jit.kernel import kernel
-from bilayer_core.jit.piece import caller, piece
-from bilayer_core.jit.record import UNALLOCATED, Record, record, record_at, shapes_of, zeros_in_one
+from bilayer_core.jit.piece import piece
+from bilayer_core.jit.record import UNALLOCATED, Record, record, shapes_of, zeros_in_one
 
 __all__ = ["UNALLOCATED", "Record", "record", "record_at", "shapes_of", "zeros_in_one"]
 __all__ += ["caller", "kernel", "piece"]

@@ -15,10 +15,9 @@ from pathlib import Path
 
 from llvmlite import binding
 
+from bilayer_core.jit.called import FIND, slot_of, symbol_of
 from bilayer_core.jit.compile_all import ENGINE, compile_all, own_pieces
 from bilayer_core.jit.library import FACTS, LIBRARY, facts
-from bilayer_core.jit.machine_code import slot_of, symbol_of
-from bilayer_core.jit.piece import FIND
 from bilayer_core.jit.target import BASELINE, machine, target
 
 

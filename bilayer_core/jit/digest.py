@@ -9,52 +9,58 @@ digests of the pieces that it changes. Comments, docstrings and the place in a f
 from __future__ import annotations
 
 import builtins
+import ctypes
 import dis
 import hashlib
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
-from typing import Any
+from typing import Any, ClassVar
 
-import llvmlite
-import numba
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import is_jitted
 
-from bilayer_core.jit.record import Record, RecordType
-from bilayer_core.jit.target import target
+from bilayer_core.jit.called import Called
+from bilayer_core.jit.kernel import PUBLIC, Kernel
+from bilayer_core.jit.record import ArrayOf, Record, name_of
+from bilayer_core.jit.target import compilers, target
 
 CACHE_DIR = "NUMBA_CACHE_DIR"
 OWN = "bilayer_core.jit"
 """Package whose functions generate code: its sources count as a whole."""
-GENERATORS = ("digest", "flat", "kernel", "machine_code", "piece", "record", "stack", "target", "undocumented")
-"""Its modules that do."""
+GENERATORS = ("called.py", "digest.py", "kernel.py", "record.py", "target.py", "compiler/*.py")
+"""Its files that do."""
 VERSIONED = frozenset({"numba", "llvmlite", "numpy", *sys.stdlib_module_names})
 """Packages whose functions count with their names: the versions of these packages are in every digest."""
 _LOAD_GLOBAL, _EXTENDED_ARG = dis.opmap["LOAD_GLOBAL"], dis.opmap["EXTENDED_ARG"]
 
 
-class CalledByName:
-    """Base of pieces: kernels that call one depend on its name and types alone."""
+class CalledByName(Called):
+    """Base of pieces: kernels that call one depend on its name and types alone.
 
-    name: str
-    signature: Any
+    Attributes
+    ----------
+    function : callable
+    slot : ctypes.c_int64
+        Its address, as kernels find it; 0 as long as none has called it, unless it is in the library.
+    finder : int
+        Address of the function that kernels ask where a slot is 0.
+    """
+
+    finder: ClassVar[int]
     function: FunctionType
+    slot: ctypes.c_int64
 
 
 @cache
 def settings() -> bytes:
     """Return what all digests have in common."""
     chosen = sorted(item for item in os.environ.items() if item[0].startswith("NUMBA_") and item[0] != CACHE_DIR)
-    public = os.environ.get("BILAYER_JIT_PUBLIC", "0")
-    versions = sys.version, numba.__version__, llvmlite.__version__, np.__version__
-    sources = [Path(__file__).with_name(f"{name}.py").read_bytes() for name in GENERATORS]
-    return hashlib.blake2b(repr((versions, target(), chosen, public, sources)).encode()).digest()
+    versions = sys.version, compilers(), np.__version__
+    sources = [path.read_bytes() for pattern in GENERATORS for path in sorted(Path(__file__).parent.glob(pattern))]
+    return hashlib.blake2b(repr((versions, target(), chosen, PUBLIC, sources)).encode()).digest()
 
 
 def digest_of(piece: CalledByName) -> tuple[str, frozenset[CalledByName]]:
@@ -66,7 +72,7 @@ def digest_of(piece: CalledByName) -> tuple[str, frozenset[CalledByName]]:
         If it uses a global of a kind that a digest does not know.
     """
     reader = _Reader()
-    reader.read((piece.name, *piece.signature.args, piece.signature.return_type, piece.function), piece.name)
+    reader.read((piece.name, piece.about, piece.function), piece.name)
     return reader.hash.hexdigest(), frozenset(reader.called)
 
 
@@ -95,33 +101,30 @@ class _Reader:
         elif isinstance(value, np.ndarray):
             self._write(f"array {value.dtype} {value.shape}")
             self._write(value.tobytes())
-        elif isinstance(value, (ModuleType, BuiltinFunctionType, np.ufunc, np.dtype, types.Type, ir.Type)):
-            self._read_by_name(value, user)
+        elif isinstance(value, (ModuleType, BuiltinFunctionType, np.ufunc, np.dtype)):
+            self._write(f"{type(value).__qualname__} {getattr(value, '__name__', value)}")
         elif id(value) in self._met:
             self._write(f"met {self._met[id(value)]}")
         else:
             self._met[id(value)] = len(self._met)
             self._read_once(value, user)
 
-    def _read_by_name(self, value: Any, user: str) -> None:
-        if isinstance(value, RecordType):
-            self._write(_record_text(value.declared))
-        else:
-            self._write(f"{type(value).__qualname__} {getattr(value, '__name__', value)}")
-
     def _read_once(self, value: Any, user: str) -> None:
         if isinstance(value, CalledByName):
-            self._write(f"piece {value.name} {value.signature}")
+            self._write(f"piece {value.name} {', '.join(map(name_of, value.about))}")
             self.called.append(value)
+        elif isinstance(value, Called):
+            self._write(f"called {value.name}")
+            self.read(value.about, user)
         elif isinstance(value, type) and issubclass(value, Record):
             self._write(_record_text(value))
-        elif is_jitted(value):
-            self._write(f"kernel {sorted((name, str(option)) for name, option in _options(value))}")
+        elif isinstance(value, ArrayOf):
+            self._write(name_of(value))
+        elif isinstance(value, Kernel):
+            self._write(f"kernel {sorted(_options(value))}")
             self.read(value.py_func, user)
         elif isinstance(value, FunctionType):
             self._read_function(value)
-        elif hasattr(value, "__wrapped__"):  # an intrinsic
-            self.read(value.__wrapped__, user)
         elif getattr(value, "__module__", "").split(".")[0] in VERSIONED and hasattr(value, "__qualname__"):
             self._write(f"{value.__module__}.{value.__qualname__}")
         elif callable(value) and type(value).__module__.split(".")[0] in VERSIONED:
@@ -165,17 +168,16 @@ class _Reader:
 def _record_text(declared: type[Record]) -> bytes:
     """Return a hash of the fields of a record, and of those of records among them."""
     digest = hashlib.blake2b(f"record {declared.__module__}.{declared.__qualname__}".encode(), digest_size=16)
-    for name, kind in declared.numba_type().fields.items():
-        of = _record_text(kind.declared) if isinstance(kind, RecordType) else str(kind).encode()
+    for name, kind in declared.layout().fields.items():
+        of = _record_text(kind) if isinstance(kind, type) and issubclass(kind, Record) else name_of(kind).encode()
         digest.update(b"%s: %s; " % (name.encode(), of))
     return digest.digest()
 
 
-def _options(kernel: Any) -> Iterator[tuple[str, Any]]:
+def _options(kernel: Kernel) -> Iterator[tuple[str, str]]:
     """Options of numba, with those that are sets in an order."""
-    options: Mapping[str, Any] = kernel.targetoptions
-    for name, option in options.items():
-        yield name, sorted(option) if isinstance(option, (set, frozenset)) else option
+    for name, option in kernel.options.items():
+        yield name, str(sorted(option) if isinstance(option, set) else option)
 
 
 @cache

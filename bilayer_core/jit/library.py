@@ -16,13 +16,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import llvmlite
-import numba
-
 from bilayer_core.jit.cache import PACKAGE, sources
+from bilayer_core.jit.called import slot_of
 from bilayer_core.jit.digest import CACHE_DIR, CalledByName
-from bilayer_core.jit.machine_code import slot_of
-from bilayer_core.jit.target import BASELINE, reaches_baseline, target
+from bilayer_core.jit.target import BASELINE, compilers, reaches_baseline, target
 
 LIBRARY = Path(__file__).with_name("engine.so")
 FACTS = LIBRARY.with_suffix(".json")
@@ -32,7 +29,7 @@ _log = logging.getLogger(__name__)
 
 def facts() -> dict[str, Any]:
     """Return what the text of a library that is compiled now says."""
-    versions = {"numba": numba.__version__, "llvmlite": llvmlite.__version__, "python": platform.python_version()}
+    versions = compilers() | {"python": platform.python_version()}
     return {"target": target()[0], "versions": versions, "sources": sources()}
 
 
@@ -94,7 +91,7 @@ def slot_of_piece(piece: CalledByName) -> ctypes.c_int64 | None:
 def origin() -> dict[str, str]:
     """Return what last digits depend on: the target, the compiler of the engine, and the library of functions."""
     found = (recorded() if is_in_use() else None) or facts()
-    compiler = ", ".join(f"{name} {found['versions'][name]}" for name in ("numba", "llvmlite"))
+    compiler = ", ".join(f"{name} {found['versions'][name]}" for name in compilers())
     return {
         "target": found["target"],
         "compiler": compiler,

@@ -8,12 +8,12 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 from functools import cache
+from importlib import import_module
 
-import numba
 from llvmlite import binding
-from numba import types
 
-from bilayer_core.jit.machine_code import symbol_of
+from bilayer_core.jit.called import symbol_of
+from bilayer_core.jit.kernel import COMPILER
 
 HELPERS = ("numba_do_raise", "numba_runtime_build_excinfo_struct", "numba_unpickle", "NRT_MemInfo_call_dtor")
 """Functions of numba's library that code calls where bounds are checked, and where arrays are counted."""
@@ -27,17 +27,6 @@ def _linker() -> binding.LLJIT:
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     return binding.create_lljit_compiler(use_jit_link=True)
-
-
-def _address_of_helper(name: str) -> int:
-    """Return the address of a function of numba's, which it knows once it has compiled something."""
-    if binding.address_of_symbol(name) is None:
-        numba.cfunc(types.int64(types.int64))(_same)
-    return binding.address_of_symbol(name)
-
-
-def _same(number):
-    return number
 
 
 def load(name: str, code: bytes, symbols: Mapping[str, int]) -> int:
@@ -57,7 +46,7 @@ def load(name: str, code: bytes, symbols: Mapping[str, int]) -> int:
         If it cannot be linked.
     """
     library = binding.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(symbol_of(name))
-    helpers = {name: _address_of_helper(name) for name in HELPERS if name.encode() in code}
+    helpers = {name: import_module(COMPILER).address_of_helper(name) for name in HELPERS if name.encode() in code}
     for symbol, address in (helpers | dict(symbols)).items():
         library.import_symbol(symbol, address)
     _loaded.append(library.link(_linker(), f"{name} {next(_numbers)}"))

@@ -18,34 +18,25 @@ stands in a table of addresses, and `caller` makes the function that calls it.
 from __future__ import annotations
 
 import ctypes
-import inspect
 import os
 import threading
 import time
 import traceback
 from collections.abc import Callable
 from functools import cached_property
+from importlib import import_module
 from typing import Any
 
-from llvmlite import binding, ir
-from numba import errors
-from numba.core import cgutils
-from numba.extending import intrinsic, lower_builtin, type_callable
-from numba.types import Any as AnyType
-from numba.types import VarArg
-
 from bilayer_core.jit import cache, library
+from bilayer_core.jit.called import FIND, slot_of
 from bilayer_core.jit.digest import CalledByName, digest_of
+from bilayer_core.jit.kernel import COMPILER
 from bilayer_core.jit.load_piece import load
-from bilayer_core.jit.machine_code import compile_piece, slot_of
-from bilayer_core.jit.record import NUMBERS, Record, type_in_kernels
+from bilayer_core.jit.record import Record
 
 IN_C = {int: ctypes.c_int64, float: ctypes.c_double, bool: ctypes.c_bool}
-FIND = "bilayer_find_piece"
-"""Symbol of the function that kernels call for the address of a piece whose slot is empty."""
 MOST_CALLS = 1000
 """Of a piece that cannot be compiled; who goes on calling it would never end."""
-_word = ir.IntType(64)
 _lock = threading.RLock()
 
 
@@ -64,16 +55,11 @@ class Piece(CalledByName):
     """
 
     def __init__(self, function: Callable, result: type, arguments: tuple):
-        self.name, self.function = function.__name__, function
-        self._result, self._arguments = result, arguments
+        super().__init__(function.__name__, result, *arguments)
+        self.function, self._result, self._arguments = function, result, arguments
         self._address, self._callable = 0, None
         self.slot, self.seconds = library.slot_of_piece(self) or ctypes.c_int64(0), 0.0
-        declare_calls_of(self)
-
-    @property
-    def signature(self):
-        """Types in kernels."""
-        return NUMBERS[self._result](*map(type_in_kernels, self._arguments))
+        _by_slot[ctypes.addressof(self.slot)] = self
 
     @property
     def address(self) -> int:
@@ -103,14 +89,14 @@ class Piece(CalledByName):
     def make_object(self) -> bytes:
         """Return its object file, from the cache or else compiled and kept there."""
         if (code := cache.kept(self.file)) is None:
-            code = compile_piece(self)
+            code = import_module(COMPILER).compile_piece(self)
             cache.keep(self.file, code)
         return code
 
     def _load(self) -> int:
         if self.slot.value:  # it is in the library
             return self.slot.value
-        symbols = {FIND: binding.address_of_symbol(FIND)}
+        symbols = {FIND: self.finder}
         symbols |= {slot_of(of.name): ctypes.addressof(of.slot) for of in self.calls}
         try:
             return load(self.name, self.make_object(), symbols)
@@ -179,7 +165,7 @@ PIECES: dict[str, Piece] = {}
 loading = Loading()
 _by_slot: dict[int, Piece] = {}
 _find = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(loading.find)
-binding.add_symbol(FIND, ctypes.cast(_find, ctypes.c_void_p).value)
+CalledByName.finder = ctypes.cast(_find, ctypes.c_void_p).value or 0
 
 
 def piece(result: type, *arguments) -> Callable[[Callable], Piece]:
@@ -200,85 +186,3 @@ def piece(result: type, *arguments) -> Callable[[Callable], Piece]:
         return PIECES[function.__name__]
 
     return declare
-
-
-def declare_calls_of(of: Piece) -> None:
-    """Tell numba what a call of a piece is: of the address in its slot, with the declared types."""
-    parameters, symbol = inspect.signature(of.function), slot_of(of.name)
-    _by_slot[ctypes.addressof(of.slot)] = of
-    binding.add_symbol(symbol, ctypes.addressof(of.slot))
-
-    @type_callable(of)
-    def type_call(context):
-        def check(*given, **named):
-            check_types(context, of.name, of.signature.args, parameters.bind(*given, **named).args)
-            return of.signature
-
-        check.__signature__ = parameters
-        return check
-
-    @lower_builtin(of, VarArg(AnyType))
-    def call_slot(context, builder, signature, arguments):
-        known = builder.module.globals
-        slot = known.get(symbol) or ir.GlobalVariable(builder.module, _word, symbol)
-        find = known.get(FIND) or ir.Function(builder.module, ir.FunctionType(_word, [_word]), FIND)
-        before, missing, there, after = builder.block, *(builder.append_basic_block() for _ in range(3))
-        present = builder.load(slot)
-        builder.cbranch(cgutils.is_not_null(builder, present), there, missing).set_weights([99, 1])
-        builder.position_at_end(missing)
-        found = builder.call(find, [builder.ptrtoint(slot, _word)])
-        builder.cbranch(cgutils.is_not_null(builder, found), there, after).set_weights([99, 1])
-        builder.position_at_end(there)
-        target = builder.phi(_word)
-        target.add_incoming(present, before)
-        target.add_incoming(found, missing)
-        result = builder.call(builder.inttoptr(target, pointer_to(context, signature)), arguments)
-        builder.branch(after)
-        builder.position_at_end(after)
-        returned = builder.phi(result.type)
-        returned.add_incoming(ir.Constant(result.type, None), missing)
-        returned.add_incoming(result, there)
-        return returned
-
-
-def caller(name: str, signature: Callable):
-    """Return a function for kernels that calls the code at an address.
-
-    Parameters
-    ----------
-    name : str
-        For messages.
-    signature : callable
-        Returns the signature of what is called.
-    """
-
-    @intrinsic
-    def call_at(typing_context, address, arguments):
-        called = signature()
-        check_types(typing_context, name, called.args, arguments.types)
-
-        def generate(context, builder, of_call, values):
-            items = cgutils.unpack_tuple(builder, values[1], len(called.args))
-            items = [
-                context.cast(builder, item, of, to)
-                for item, of, to in zip(items, arguments.types, called.args, strict=True)
-            ]
-            return builder.call(builder.inttoptr(values[0], pointer_to(context, called)), items)
-
-        return called.return_type(address, arguments), generate
-
-    return call_at
-
-
-def check_types(typing_context, name: str, wanted: tuple, given: tuple) -> None:
-    """Raise the error of compilation of a call with other types than those declared."""
-    fits = len(wanted) == len(given)
-    if not fits or any(typing_context.can_convert(*kinds) is None for kinds in zip(given, wanted, strict=True)):
-        listed = [", ".join(map(str, kinds)) for kinds in (wanted, given)]
-        raise errors.TypingError(f"{name}: is called with ({listed[1]}); it takes ({listed[0]})")
-
-
-def pointer_to(context, signature) -> ir.PointerType:
-    """LLVM's type of the address of a function."""
-    kinds = [context.get_value_type(of) for of in signature.args]
-    return ir.FunctionType(context.get_value_type(signature.return_type), kinds).as_pointer()

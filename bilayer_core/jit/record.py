@@ -26,20 +26,26 @@ import math
 import typing
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import accumulate
 from typing import Any, dataclass_transform
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic, models, register_model
-
-from bilayer_core.jit.undocumented import add_attributes, add_field
 
 WORD = 8
 CACHE_LINE = 64
 """At whose multiples arrays that share a block of memory begin [bytes]."""
+
+
+@dataclass(frozen=True)
+class ArrayOf:
+    """Type of an array that is contiguous, the last index fastest."""
+
+    dtype: np.dtype
+    ndim: int
+
+
 if typing.TYPE_CHECKING:  # what programs that are not compiled get
     Vector = np.ndarray
     Matrix = np.ndarray
@@ -53,63 +59,47 @@ if typing.TYPE_CHECKING:  # what programs that are not compiled get
     Singles = np.ndarray
     SingleTable = np.ndarray
 else:
-    Vector, Matrix, Stack, Tensor, DeepTensor = (types.Array(types.float64, n, "C") for n in range(1, 6))
+    Vector, Matrix, Stack, Tensor, DeepTensor = (ArrayOf(np.dtype(np.float64), n) for n in range(1, 6))
     """Arrays of floats with one to five indices."""
-    Indices, IndexTable = (types.Array(types.int64, n, "C") for n in (1, 2))
+    Indices, IndexTable = (ArrayOf(np.dtype(np.int64), n) for n in (1, 2))
     """Arrays of integers."""
-    Flags, FlagTable = (types.Array(types.boolean, n, "C") for n in (1, 2))
+    Flags, FlagTable = (ArrayOf(np.dtype(np.bool_), n) for n in (1, 2))
     """Arrays of booleans."""
-    Singles, SingleTable = (types.Array(types.float32, n, "C") for n in (1, 2))
+    Singles, SingleTable = (ArrayOf(np.dtype(np.float32), n) for n in (1, 2))
     """Arrays of floats of single precision, as messages have them."""
 UNALLOCATED: Mapping[str, int] = defaultdict(int)
 """Sizes of a record whose arrays with a declared shape come later; see `Record.allocated`."""
-NUMBERS = {int: types.int64, float: types.float64, bool: types.boolean}
-DTYPES = {
-    types.float64: np.dtype(np.float64),
-    types.float32: np.dtype(np.float32),
-    types.int64: np.dtype(np.int64),
-    types.boolean: np.dtype(np.bool_),
-}
 _ADDRESS_WORD = 4
 """Of the words of an array, which one its address is."""
-_WORD_TYPE, _BYTES = ir.IntType(8 * WORD), ir.IntType(8).as_pointer()
 
 
-def _word_count(kind: types.Type) -> int:
+def _word_count(kind: Any) -> int:
     """Return the number of words that a field takes."""
-    return 5 + 2 * kind.ndim if isinstance(kind, types.Array) else 1
+    return 5 + 2 * kind.ndim if isinstance(kind, ArrayOf) else 1
 
 
-class RecordType(types.Type):
-    """Type of a record in kernels.
+class Layout:
+    """Where fields of a record are in memory.
 
     Attributes
     ----------
-    declared : type
-        The class of its records.
     fields : dict
-        Numba type of each field.
+        Type of each field: int, float, bool, `ArrayOf`, or a class of records.
     offset : dict
-        Configuration of each field [words].
+        Place of each field [words].
     declared_fields : list of tuple
         Name and type of each field, and the dtype of an array.
     """
 
-    def __init__(self, declared: type[Record], fields: dict[str, types.Type]):
-        self.declared, self.fields, self.offset = declared, fields, {}
+    def __init__(self, fields: dict[str, Any]):
+        self.fields, self.offset = fields, {}
         offset = 1
         for name, kind in fields.items():
             self.offset[name] = offset
             offset += _word_count(kind)
         self.declared_fields = [
-            (name, kind, DTYPES[kind.dtype] if isinstance(kind, types.Array) else None) for name, kind in fields.items()
+            (name, kind, kind.dtype if isinstance(kind, ArrayOf) else None) for name, kind in fields.items()
         ]
-        super().__init__(f"{declared.__module__}.{declared.__qualname__}")
-
-    @property
-    def key(self):
-        """The class of its records: numba takes types with equal keys for one, and two classes may share a name."""
-        return self.declared
 
 
 class Record:
@@ -127,13 +117,13 @@ class Record:
     def __init__(self, **values: Any):
         self._hold(values)
         words = [1]
-        for name, of, dtype in self.numba_type().declared_fields:
+        for name, of, dtype in self.layout().declared_fields:
             words += _words(values[name], of, dtype, (type(self).__name__, name))
         self._lie_in(np.array(words, dtype=np.int64))
 
     def _hold(self, values: dict[str, Any]) -> None:
         """Have the values as attributes; they are those of all fields."""
-        fields = self.numba_type().fields
+        fields = self.layout().fields
         if values.keys() != fields.keys():
             wrong = ", ".join(sorted(values.keys() ^ fields.keys()))
             raise TypeError(f"{type(self).__name__}: these fields are missing or unknown: {wrong}")
@@ -153,11 +143,11 @@ class Record:
         if "_absent" in cls.__dict__:
             return cls._absent
         values = {}
-        for name, of in cls.numba_type().fields.items():
-            if isinstance(of, types.Array):
-                values[name] = np.zeros((0,) * of.ndim, DTYPES[of.dtype])
+        for name, of in cls.layout().fields.items():
+            if isinstance(of, ArrayOf):
+                values[name] = np.zeros((0,) * of.ndim, of.dtype)
             else:
-                values[name] = of.declared.absent() if isinstance(of, RecordType) else 0
+                values[name] = of.absent() if issubclass(of, Record) else 0
         empty = cls(**values)
         empty._memory[0] = 0
         cls._absent = empty
@@ -178,7 +168,7 @@ class Record:
         base, arrays = block.arrays()
         made = cls.__new__(cls)
         made._hold(values | arrays)
-        memory, kind = block.words.copy(), cls.numba_type()
+        memory, kind = block.words.copy(), cls.layout()
         memory[block.addresses] += base
         for name, of, dtype in kind.declared_fields if len(arrays) < len(kind.fields) else ():
             if name not in arrays:
@@ -204,17 +194,12 @@ class Record:
         return self.zeros(sizes, **lasting | values) if self.exists else self
 
     @classmethod
-    def numba_type(cls) -> RecordType:
-        """Its type in kernels."""
-        if "_numba_type" not in cls.__dict__:
+    def layout(cls) -> Layout:
+        """Return where its fields are in memory."""
+        if "_layout" not in cls.__dict__:
             hints = typing.get_type_hints(cls)
-            cls._numba_type = RecordType(
-                cls,
-                {name: type_in_kernels(hints[name]) for name in cls.names},
-            )
-            for name in ("exists", *cls.names):
-                add_field(RecordType, name, _type_of_field, _read_field)
-        return cls._numba_type
+            cls._layout = Layout({name: hints[name] for name in cls.names})
+        return cls._layout
 
 
 @dataclass_transform(kw_only_default=True)
@@ -256,12 +241,12 @@ class _Block:
     """
 
     def __init__(self, declared: type[Record], shapes: Mapping[str, tuple[int, ...]]):
-        kind, self._size, addresses = declared.numba_type(), 0, []
+        kind, self._size, addresses = declared.layout(), 0, []
         self._places: list[tuple[str, tuple[int, ...], np.dtype, int]] = []
         self.words = np.zeros(1 + sum(map(_word_count, kind.fields.values())), dtype=np.int64)
         self.words[0] = 1
         for name, shape in shapes.items():
-            dtype, first = DTYPES[kind.fields[name].dtype], kind.offset[name]
+            dtype, first = kind.fields[name].dtype, kind.offset[name]
             like = np.ndarray(shape, dtype, np.zeros(math.prod(shape) * dtype.itemsize, np.uint8))
             own = [0, 0, like.size, dtype.itemsize, self._size, *shape, *like.strides]
             self.words[first : first + len(own)] = own
@@ -291,24 +276,11 @@ def _sizes_in(declared: type[Record], names: tuple[str, ...]) -> tuple[str, ...]
     return tuple(dict.fromkeys(part for part in parts if isinstance(part, str)))
 
 
-def type_in_kernels(declared: Any) -> types.Type:
-    """Numba type for what annotations and pieces declare: a number, an array, or a class of records."""
-    if isinstance(declared, types.Type):
-        return declared
-    return NUMBERS[declared] if declared in NUMBERS else declared.numba_type()
-
-
-def record_at(declared: type[Record]):
-    """Return a function for kernels that gives the record of a class at an address."""
-
-    @intrinsic
-    def at(typing_context, address):
-        def generate(context, builder, signature, arguments):
-            return builder.inttoptr(arguments[0], _BYTES)
-
-        return declared.numba_type()(types.int64), generate
-
-    return at
+def name_of(kind: Any) -> str:
+    """Return the name of a type of fields and of pieces: of a class of records its own, whatever its fields are."""
+    if isinstance(kind, ArrayOf):
+        return f"{kind.dtype} {kind.ndim}"
+    return f"{kind.__module__}.{kind.__qualname__}"
 
 
 def shown(value: object) -> str:
@@ -323,7 +295,7 @@ def _address(array: np.ndarray) -> int:
     return array.__array_interface__["data"][0]  # half the time of `ctypes.data`
 
 
-def _words(value: Any, of: types.Type, dtype: np.dtype | None, name: tuple[str, str]) -> list[int]:
+def _words(value: Any, of: Any, dtype: np.dtype | None, name: tuple[str, str]) -> list[int]:
     """Return the words in memory for a value, which must be an array of type `dtype` unless that is None."""
     if dtype is not None:
         if isinstance(value, np.ndarray) and value.ndim == of.ndim and value.dtype == dtype:
@@ -333,32 +305,8 @@ def _words(value: Any, of: types.Type, dtype: np.dtype | None, name: tuple[str, 
                 return [0, 0, value.size, dtype.itemsize, address, *value.shape, *value.strides]
         found = f"{value.dtype}, shape {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
         raise TypeError(f"{'.'.join(name)}: {found} is not a contiguous array of {of.ndim} indices, {of.dtype}")
-    if isinstance(of, RecordType):
-        if not isinstance(value, of.declared):
-            raise TypeError(f"{'.'.join(name)}: a {type(value).__name__} is no {of.declared.__name__}")
+    if issubclass(of, Record):
+        if not isinstance(value, of):
+            raise TypeError(f"{'.'.join(name)}: a {type(value).__name__} is no {of.__name__}")
         return [value.address]
-    return [int(np.float64(value).view(np.int64)) if of is types.float64 else int(value)]
-
-
-@register_model(RecordType)
-class _RecordModel(models.OpaqueModel):
-    """In kernels a record is its address."""
-
-
-def _type_of_field(of: RecordType, name: str) -> types.Type | None:
-    return types.boolean if name == "exists" else of.fields.get(name)
-
-
-def _read_field(context, builder, of: RecordType, address, name: str):
-    if name == "exists":
-        word = builder.load(builder.bitcast(address, _WORD_TYPE.as_pointer()))
-        return builder.icmp_signed("!=", word, ir.Constant(_WORD_TYPE, 0))
-    model = context.data_model_manager[of.fields[name]]
-    kind = model.get_data_type()
-    place = builder.gep(address, [ir.Constant(_WORD_TYPE, WORD * of.offset[name])])
-    value = builder.load(builder.bitcast(place, kind.as_pointer()), align=WORD)
-    value.set_metadata("invariant.load", builder.module.add_metadata([]))  # fields do not change: out of loops with it
-    return value if kind == model.get_value_type() else model.from_data(builder, value)
-
-
-add_attributes(RecordType, _type_of_field, _read_field)
+    return [int(np.float64(value).view(np.int64)) if of is float else int(value)]

@@ -10,8 +10,9 @@ from __future__ import annotations
 import os
 import platform
 from functools import cache
+from importlib.metadata import version
 
-import numba
+import llvmlite
 from llvmlite import binding
 
 BASELINE = "x86-64-v3"
@@ -30,18 +31,18 @@ def reaches_baseline() -> bool:
 @cache
 def target() -> tuple[str, str]:
     """Return the processor and its features, by LLVM's names; numba's own settings come first."""
-    if numba.config.CPU_NAME is not None or numba.config.CPU_FEATURES is not None:
-        name = numba.config.CPU_NAME or binding.get_host_cpu_name()
-        return name, numba.config.CPU_FEATURES or ""
+    name, features = os.environ.get("NUMBA_CPU_NAME"), os.environ.get("NUMBA_CPU_FEATURES")
+    if name or features:
+        return name or binding.get_host_cpu_name(), features or ""
     if os.environ.get(SWITCH, "") != NATIVE and reaches_baseline():
         return BASELINE, ""
     return binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
 
 
-def set_target() -> None:
-    """Have numba compile for the target: it takes this when it compiles its first function, and optimises for it."""
-    numba.config.reload_config()  # which would undo this if it came later, after a change of the environment
-    numba.config.CPU_NAME, numba.config.CPU_FEATURES = target()
+@cache
+def compilers() -> dict[str, str]:
+    """Return the versions of what makes machine code; numba is not imported for it."""
+    return {"numba": version("numba"), "llvmlite": llvmlite.__version__}
 
 
 @cache

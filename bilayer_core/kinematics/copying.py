@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bilayer_core.jit import kernel
-from bilayer_core.jit.flat import flat
+from bilayer_core.jit.called import flat
 
 
 @kernel

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from functools import cache
+from importlib.metadata import version
 
 import numpy as np
 
@@ -15,17 +16,14 @@ def versions() -> dict[str, str]:
 
 @cache
 def _versions() -> dict[str, str]:
-    import numba
-    import scipy
-
     from bilayer_core import __version__
 
     return {
         "bilayer_sim_ros": __version__,
         "python": platform.python_version(),
         "numpy": np.__version__,
-        "scipy": scipy.__version__,
-        "numba": numba.__version__,
+        "scipy": version("scipy"),
+        "numba": version("numba"),
     }
 
 

@@ -140,12 +140,14 @@ def test_no_module_has_the_name_of_one_beside_it_or_next_door():
 PUBLIC_NUMBA = {"numba", "numba.extending", "numba.core.types", "numba.core.cgutils", "numba.types"}
 OFFERED = {"numba.core": {"cgutils", "types"}}
 """What numba's documentation of extensions imports from its inside."""
-EXCEPTION = "bilayer_core/jit/undocumented.py"
+COMPILER = "bilayer_core/jit/compiler/"
+EXCEPTION = f"{COMPILER}undocumented.py"
 
 
-def test_only_one_short_file_uses_what_numba_does_not_document():
+def test_only_the_compiler_uses_numba_and_only_one_short_file_what_that_does_not_document():
     for path in modules():
         name = path.relative_to(ROOT).as_posix()
+        assert name.startswith(COMPILER) or not {of for of in imported_names(path) if of.split(".")[0] == "numba"}, name
         if name == EXCEPTION:
             assert len(path.read_text().splitlines()) <= 100
             continue
@@ -168,7 +170,7 @@ def test_every_file_with_kernels_is_part_of_the_fingerprint_of_the_cache():
             if isinstance(node, (ast.FunctionDef, ast.ClassDef))
             for of in node.decorator_list
         }
-        if decorators & {"kernel", "exact_kernel", "entry", "piece", "record", "intrinsic"}:
+        if decorators & {"kernel", "exact_kernel", "entry", "piece", "record"}:
             assert part_of(path) in FOLDERS, path
 
 

@@ -1,6 +1,8 @@
 """The digest of a piece: another one exactly where its machine code may be another."""
 
 import math
+import os
+import subprocess
 import sys
 import textwrap
 from itertools import count
@@ -30,7 +32,7 @@ class Field:
 
 
 inner_at = record_at(Inner)
-call_other = caller("other", lambda: other.signature)
+call_other = caller("other", float, float)
 
 
 @kernel
@@ -111,7 +113,7 @@ def test_records_behind_addresses_and_signatures_behind_tables_count(digested):
     one = digested(through)[0]
     assert digested(through.replace("    values: Vector", "    more: float\n    values: Vector"))[0] != one
     assert digested(through.replace("record_at(Inner)", "record_at(Field)"))[0] != one
-    assert digested(through.replace("other.signature", "whole.signature"))[0] != one
+    assert digested(through.replace('"other", float, float', '"other", float, Field, float'))[0] != one
 
 
 def test_names_of_attributes_are_not_taken_for_globals(digested):
@@ -138,8 +140,8 @@ def test_every_piece_of_the_engine_has_a_digest_of_its_own():
 
 
 def test_code_is_for_the_baseline_unless_native_code_or_another_processor_is_wanted(monkeypatch):
-    monkeypatch.setattr(target.numba.config, "CPU_NAME", None)
-    monkeypatch.setattr(target.numba.config, "CPU_FEATURES", None)
+    monkeypatch.delenv("NUMBA_CPU_NAME", raising=False)
+    monkeypatch.delenv("NUMBA_CPU_FEATURES", raising=False)
     native = target.binding.get_host_cpu_name(), target.binding.get_host_cpu_features().flatten()
     monkeypatch.delenv(target.SWITCH, raising=False)
     assert target.target.__wrapped__() == ((target.BASELINE, "") if target.reaches_baseline() else native)
@@ -148,6 +150,27 @@ def test_code_is_for_the_baseline_unless_native_code_or_another_processor_is_wan
     monkeypatch.delenv(target.SWITCH)
     monkeypatch.setattr(target, "reaches_baseline", lambda: False)
     assert target.target.__wrapped__() == native
-    monkeypatch.setattr(target.numba.config, "CPU_NAME", "generic")
+    monkeypatch.setenv("NUMBA_CPU_NAME", "generic")
     assert target.target.__wrapped__() == ("generic", "")
     assert len(digest.settings()) == 64
+
+
+COMPILED = """
+import hashlib
+import bilayer_core.engine
+from bilayer_core.jit.compiler.machine_code import compile_piece
+from bilayer_core.jit.piece import PIECES
+
+print(hashlib.sha256(compile_piece(PIECES["corner_after"])).hexdigest())
+"""
+
+
+@pytest.mark.skipif(not target.reaches_baseline(), reason="the processor is below the baseline")
+def test_numba_optimises_for_the_baseline_and_not_for_the_processor():
+    wanted = {"NUMBA_CPU_NAME": target.BASELINE, "NUMBA_CPU_FEATURES": ""}
+    plain = {name: text for name, text in os.environ.items() if name not in wanted} | {"PYTHONHASHSEED": "0"}
+    codes = {
+        subprocess.run([sys.executable, "-c", COMPILED], env=of, capture_output=True, text=True, check=True).stdout
+        for of in (plain, plain | wanted)
+    }
+    assert len(codes) == 1

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from bilayer_core.jit import caller, kernel, piece, record, record_at
+from bilayer_core.jit.called import stack_matrix, stack_vector
 from bilayer_core.jit.kernel import exact_kernel
 from bilayer_core.jit.piece import Piece, loading
 from bilayer_core.jit.record import Flags, IndexTable, Indices, Vector
-from bilayer_core.jit.stack import stack_matrix, stack_vector
 
 
 @record
@@ -237,7 +237,7 @@ def test_an_interruption_while_a_piece_is_compiled_is_raised_when_compiled_code_
     assert add_the_triple(1) == 4
 
 
-call_reading = caller("call_reading", lambda: read_for_another_piece.signature)
+call_reading = caller("call_reading", float, Reading, int)
 
 
 @record

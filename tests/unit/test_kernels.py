@@ -8,19 +8,15 @@ from pathlib import Path
 
 PROGRAM = """
 import gc, json
-from numba.extending import is_jitted
 from support.sample_scenes import everything
 from bilayer_core import Simulator, load_scene
+from bilayer_core.jit.kernel import Kernel
 from bilayer_core.jit.piece import PIECES
 
 simulator = Simulator(load_scene(everything()), dt=1e-3, budget=True)
 simulator.run(0.003)
 simulator.contact_forces, simulator.curvatures
-compiled = [
-    f"{of.py_func.__module__}.{of.py_func.__name__}"
-    for of in gc.get_objects()
-    if is_jitted(of) and of.py_func.__module__.startswith("bilayer_core") and of.signatures
-]
+compiled = [of.__name__ for of in gc.get_objects() if isinstance(of, Kernel) and "compiled" in vars(of)]
 print(json.dumps([sorted(compiled), sorted(name for name, of in PIECES.items() if of.seconds)]))
 """
 
@@ -34,7 +30,7 @@ from bilayer_core.jit.piece import PIECES
 simulator = Simulator(load_scene("gripping"))
 needed = needed_pieces(simulator.model)
 simulator.run(0.1)
-slow = sorted({"scipy.linalg", "scipy.special", "pint", "rich", "matplotlib"} & set(sys.modules))
+slow = sorted({"numba", "scipy.linalg", "scipy.special", "pint", "rich", "matplotlib"} & set(sys.modules))
 print(json.dumps([sorted(needed), sorted(name for name, of in PIECES.items() if of.seconds), slow]))
 """
 

@@ -12,7 +12,7 @@ after the node and the two angles, by ε_b = x_i − x_b and ε_a = x_a − x_i.
 from __future__ import annotations
 
 from bilayer_core.jit import kernel, piece
-from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.jit.called import stack_matrix
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 

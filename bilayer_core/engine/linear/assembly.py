@@ -8,7 +8,7 @@ factors −1, +1 and ±½ or ±1. This is the only file that joins second deriva
 from __future__ import annotations
 
 from bilayer_core.jit import kernel, piece
-from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.jit.called import stack_matrix
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 

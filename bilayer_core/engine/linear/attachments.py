@@ -13,7 +13,7 @@ attached nodes leave the band for the border U and the corner D of free bodies.
 from __future__ import annotations
 
 from bilayer_core.jit import kernel
-from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.jit.called import stack_matrix
 from bilayer_core.kinematics.vector import dot, row
 
 

@@ -8,7 +8,7 @@ inner loops have fixed lengths. Cost: n b² and 4 n b per right-hand side.
 from __future__ import annotations
 
 from bilayer_core.jit import kernel
-from bilayer_core.jit.stack import stack_vector
+from bilayer_core.jit.called import stack_vector
 
 
 def width(half_bandwidth: int) -> tuple[int, ...]:

@@ -7,7 +7,7 @@ from bilayer_core.engine.linear.attachments import condense_clamp_edges, condens
 from bilayer_core.engine.linear.contact_columns import condense_contacts_to_bodies
 from bilayer_core.engine.linear.dense import count_negative_dense, factor_dense, solve_dense
 from bilayer_core.jit import kernel, piece
-from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.jit.called import stack_matrix
 from bilayer_core.kinematics.copying import copy
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY

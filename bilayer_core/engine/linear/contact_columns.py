@@ -25,7 +25,7 @@ from bilayer_core.engine.linear.assembly import hold_unknowns
 from bilayer_core.engine.linear.attachments import arm_jacobian
 from bilayer_core.engine.linear.new_columns import add_columns
 from bilayer_core.jit import kernel, piece
-from bilayer_core.jit.stack import stack_matrix
+from bilayer_core.jit.called import stack_matrix
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 

@@ -2,9 +2,9 @@
 
 ``BILAYER_JIT_PUBLIC=1`` runs without them; the tests do so once.
 
-- The option ``_nrt=False``: arrays are not counted. They belong to records, which outlive every kernel. With numba's
-  counting a step of the cantilever takes 2.4 times as long, one of the gripper 1.6 times (median of runs with and
-  without).
+- The option ``_nrt=False`` (in `jit.kernel`): arrays are not counted. They belong to records, which outlive every
+  kernel. With numba's counting a step of the cantilever takes 2.4 times as long, one of the gripper 1.6 times (median
+  of runs with and without).
 - A template for the attributes of records, the base class that `numba.extending.infer_getattr` asks for and does not
   export. The documented way, `overload_attribute`, compiles a function for every field of every record: 29 ms each,
   some 11 s of the first start.
@@ -12,15 +12,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 
 from numba import types
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import infer_getattr, intrinsic, lower_getattr_generic, overload_attribute
 
-PUBLIC = os.environ.get("BILAYER_JIT_PUBLIC", "0") != "0"
-OPTIONS = {} if PUBLIC else {"_nrt": False}
+from bilayer_core.jit.kernel import PUBLIC
+
 _known: set[str] = set()
 
 
