@@ -21,6 +21,7 @@ MERGE = PLAIN + "merge"
 KINDS = ("null", "bool", "int", "float", "str", "seq", "map")
 """Of values; YAML has more, such as dates and sets, which mean nothing in a scene."""
 _Base = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_Writer = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 
 def _checked(construct: Callable, what: str) -> Callable:
@@ -129,4 +130,5 @@ def _refuse_deep(text: str, source: str) -> None:
 
 def write_yaml(data: dict) -> str:
     """YAML text that `read_yaml` reads back to the same data, numbers bit for bit."""
-    return yaml.safe_dump(data, sort_keys=False, default_flow_style=None, allow_unicode=True, width=TEXT_WIDTH)
+    form = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True, "width": TEXT_WIDTH}
+    return yaml.dump(data, Dumper=_Writer, **form)

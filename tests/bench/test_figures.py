@@ -98,8 +98,8 @@ def test_the_slope_of_times_that_grow_with_a_power_is_the_power():
 
 
 def test_the_independent_rod_swings_with_a_cantilevers_frequency():
-    length, axial, bending, mass, gravity = 0.1, 20.0, 6.6667e-6, 0.02, 9.81e-3
-    rod = SplineRod(length, axial, bending, mass, 6, gravity=gravity)
+    length, axial, bending, mass, gravity = 0.1, 2.0, 6.6667e-6, 0.02, 9.81e-3
+    rod = SplineRod(length, axial, bending, mass, 4, gravity=gravity)
     frequency = FIRST_MODE**2 * math.sqrt(bending / (mass * length**4))
     period = 2.0 * math.pi / frequency
     times = np.linspace(0.0, period, 41)
@@ -128,7 +128,7 @@ def test_the_force_of_the_independent_rod_is_the_slope_of_its_energy():
     assert slope == pytest.approx(-np.sum(rod.potential_force(at, 0.0) * direction), rel=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.verify
 def test_a_start_takes_at_least_the_cpu_time_of_its_kernels_and_imports():
     found = start.first_step("cantilever", "laminate", 2, Path(os.environ["NUMBA_CACHE_DIR"]))
     assert found["compile_time"] < found["cpu_time"] and found["import_time"] < found["wall_time"]

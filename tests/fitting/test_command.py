@@ -123,7 +123,7 @@ def test_files_that_are_there_are_kept_without_force(written, here, capsys):
     assert fitted(*ASKED, "--out", "out", "--quiet") == 2
     assert "exists already; choose another name, or replace it with --force" in capsys.readouterr().err
     assert (out / "report.json").read_bytes() == before
-    assert fitted(*ASKED, "--out", "out", "--force", "--quiet") == 0
+    assert fitted(*ASKED[2:], "--out", "out", "--force", "--quiet") == 0
     assert {path.name for path in out.iterdir()} == FILES
 
 
@@ -145,7 +145,7 @@ def test_what_cannot_be_told_apart_ends_with_1_and_writes_nothing(here, capsys):
 
 def test_a_fit_that_has_not_converged_ends_with_1_and_writes_what_it_has(here, capsys, monkeypatch):
     monkeypatch.setattr("bilayer_core.studies.fitting.fit.MOST_EVALUATIONS", 1)
-    assert fitted(*ASKED, "--json", "early.json", "--quiet") == 1
+    assert fitted(*ASKED[2:], "--json", "early.json", "--quiet") == 1
     assert "not converged after as many evaluations as a fit may make" in capsys.readouterr().out
     assert json.loads((here / "early.json").read_text())["converged"] is False
 
@@ -194,7 +194,13 @@ def test_fits_import_no_matplotlib_unless_they_draw(folder):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="signals of POSIX")
-@pytest.mark.parametrize("number,told", [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "ended by SIGTERM")])
+@pytest.mark.parametrize(
+    "number,told",
+    [
+        (signal.SIGINT, "interrupted"),
+        pytest.param(signal.SIGTERM, "ended by SIGTERM", marks=pytest.mark.verify),
+    ],
+)
 def test_an_interrupted_fit_ends_with_one_line_and_leaves_no_files(folder, tmp_path, number, told):
     slow = ["--set", "solver.tolerance=1e-9", "--out", str(tmp_path / "cut")]
     process = subprocess.Popen(

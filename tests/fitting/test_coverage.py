@@ -10,7 +10,7 @@ BY_CHANCE = 1e-3
 """Probability of a result outside of the limits if intervals are right; the noise is the same each time."""
 
 
-@pytest.mark.slow
+@pytest.mark.verify
 @pytest.mark.timeout(1200)
 def test_intervals_of_twelve_fits_cover_the_truth_and_are_as_wide_as_fits_scatter():
     found = study(FITS, SEED + 1)

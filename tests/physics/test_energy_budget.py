@@ -85,11 +85,13 @@ def flyer():
     )
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS)
+CLAMPED, FLYING = (driven(gravity=[0, 0, -9.81]), 4.0), (flyer(), 2.0)  # what a turning body holds goes along arcs
+
+
 @pytest.mark.parametrize(
-    ("description", "quadrature"),
-    [(driven(gravity=[0, 0, -9.81]), 4.0), (flyer(), 2.0)],  # what a turning body holds goes along arcs
-    ids=["clamped", "flying"],
+    ("description", "quadrature", "integrator"),
+    [pytest.param(*CLAMPED, name, id=f"clamped-{name}") for name in INTEGRATORS]
+    + [pytest.param(*FLYING, name, id=f"flying-{name}") for name in ("sdirk2", "implicit_midpoint")],
 )
 def test_budget_of_a_driven_bilayer_closes_and_its_numerical_loss_has_the_order(description, quadrature, integrator):
     budgets = [run(description, 0.15, dt, integrator=integrator).budget() for dt in (1e-3, 2.5e-4)]
@@ -103,7 +105,7 @@ def test_budget_of_a_driven_bilayer_closes_and_its_numerical_loss_has_the_order(
     assert math.log(numerical[0] / numerical[1], 4) == pytest.approx(order, abs=0.25)
 
 
-@pytest.mark.slow
+@pytest.mark.verify
 def test_the_first_cycle_of_the_inchworm_closes():
     lost = []
     for dt in (2e-3, 1e-3):

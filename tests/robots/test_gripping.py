@@ -52,7 +52,7 @@ def test_the_gripper_has_the_papers_parameters():
     assert (scene.contact.barrier_distance, scene.contact.stiffness) == (1e-3, 1e7)
 
 
-@pytest.mark.parametrize("steps", [{}, {"dt": 2e-3}], ids=["adaptive", "fixed"])
+@pytest.mark.parametrize("steps", [{}, pytest.param({"dt": 2e-3}, marks=pytest.mark.verify)], ids=["adaptive", "fixed"])
 def test_arms_touch_the_ball_in_the_same_bits_whatever_watches_them(steps, tmp_path):
     simulator = Simulator(load_scene("gripping"), **steps)
     simulator.run(12.6)

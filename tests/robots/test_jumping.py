@@ -13,6 +13,19 @@ RELEASE = 1.0  # when the current stops [s]
 GRAVITY = 10.0
 
 
+OTHER_STEPS = (
+    ("solver.tolerance=1e-5",),
+    ("solver.integrator=tr_bdf2", "solver.dt=0.125 ms"),
+    (TWO_RODS, "solver.integrator=sdirk2", "solver.dt=0.25 ms"),
+)
+SHORT_STEPS = (
+    ("solver.tolerance=1e-5",),
+    ("solver.tolerance=1e-6",),
+    *((f"solver.integrator={name}", "solver.dt=0.125 ms") for name in ("sdirk2", "tr_bdf2", "generalised_alpha")),
+    (TWO_RODS, "solver.integrator=sdirk2", "solver.dt=0.125 ms"),
+)
+
+
 class Flight:
     """Watches the mass centre and the lowest face."""
 
@@ -110,10 +123,8 @@ def test_a_slow_release_does_not_make_it_jump():
 @pytest.mark.parametrize(
     "change",
     [
-        ("solver.tolerance=1e-5",),
         ("solver.integrator=sdirk2", "solver.dt=0.25 ms"),
-        ("solver.integrator=tr_bdf2", "solver.dt=0.125 ms"),
-        (TWO_RODS, "solver.integrator=sdirk2", "solver.dt=0.25 ms"),
+        *(pytest.param(changes, marks=pytest.mark.verify) for changes in OTHER_STEPS),
     ],
 )
 def test_without_a_damping_the_rise_scatters_by_a_few_percent_about_one_value(change):
@@ -125,10 +136,7 @@ def test_without_a_damping_the_rise_scatters_by_a_few_percent_about_one_value(ch
     "change",
     [
         (),
-        ("solver.tolerance=1e-5",),
-        ("solver.tolerance=1e-6",),
-        *((f"solver.integrator={name}", "solver.dt=0.125 ms") for name in ("sdirk2", "tr_bdf2", "generalised_alpha")),
-        (TWO_RODS, "solver.integrator=sdirk2", "solver.dt=0.125 ms"),
+        *(pytest.param(changes, marks=pytest.mark.verify) for changes in SHORT_STEPS),
     ],
 )
 def test_with_a_film_that_damps_the_rise_has_a_limit(change):
@@ -136,6 +144,7 @@ def test_with_a_film_that_damps_the_rise_has_a_limit(change):
     assert flight.rise == pytest.approx(0.3337, rel=0.01)
 
 
+@pytest.mark.verify
 @pytest.mark.parametrize("change", ["solver.tolerance=1.25e-5", "rods.loop.stations=51"])
 def test_steps_half_as_long_and_other_meshes_jump_as_high_as_far_as_there_is_a_limit(jump, change):
     _, flight = watched("materials.film.retardation_time=0.2 ms", change)
@@ -164,6 +173,7 @@ def test_the_energy_of_the_jump_is_found_again():
     assert budget["lost"]["rod friction"] > budget["lost"]["friction"] > 0.0
 
 
+@pytest.mark.verify
 def test_the_jump_of_two_rods_gains_nothing_from_the_integrator_however_long_its_steps():
     # with the normal forces of each step's start it gained up to a third of the supply (dt 0.25 ms), or called as much
     # friction; what is lost by impacts and vibrations, which nothing else damps, still differs from step to step

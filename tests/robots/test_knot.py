@@ -173,7 +173,7 @@ def test_both_hands_pull_as_hard():
     assert left == pytest.approx(-right, rel=0.02)
 
 
-@pytest.mark.slow
+@pytest.mark.verify
 def test_friction_adds_its_coefficient_times_the_force_between_the_strands():
     rough, smooth = (knot(*thinner(1e-3), *changes, seconds=9.0) for changes in ((), (SMOOTH,)))
     radii = loop_radius(rough), loop_radius(smooth)
@@ -182,7 +182,7 @@ def test_friction_adds_its_coefficient_times_the_force_between_the_strands():
     assert added == pytest.approx(0.1 * pressed(rough), rel=0.04)
 
 
-@pytest.mark.slow
+@pytest.mark.verify
 def test_tension_and_contact_forces_tend_to_those_of_a_loose_knot():
     """At a loop of 40 mm: a thread of a fifth of the thickness is nearer to both limits."""
     limits, far = np.array([0.5, loose_braid()]), []
@@ -199,15 +199,14 @@ def test_tension_and_contact_forces_tend_to_those_of_a_loose_knot():
     assert far[1][0] < 0.15 and far[1][1] < 0.3
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "method",
     [
         {"model": "two_rod"},
-        {"tolerance": 1e-3},
-        {"integrator": "sdirk2"},
-        {"integrator": "generalised_alpha"},
-        {"integrator": "implicit_euler", "dt": 5e-3},
+        pytest.param({"tolerance": 1e-3}, marks=pytest.mark.verify),
+        pytest.param({"integrator": "sdirk2"}, marks=pytest.mark.verify),
+        pytest.param({"integrator": "generalised_alpha"}, marks=pytest.mark.verify),
+        pytest.param({"integrator": "implicit_euler", "dt": 5e-3}, marks=pytest.mark.verify),
     ],
     ids=str,
 )

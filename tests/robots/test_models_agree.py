@@ -21,6 +21,7 @@ def both(scene, duration, figure, *changes):
     return found
 
 
+@pytest.mark.verify
 def test_the_walker_with_two_legs_takes_the_same_strides():
     bonded, whole = (strides("crawling_dual_leg", 2, *PAPERS, model)[0] for model in (TWO_RODS, LAMINATE))
     assert whole == pytest.approx(bonded, rel=2e-3)
@@ -32,11 +33,13 @@ def test_the_jumper_rises_as_high():
     assert whole == pytest.approx(bonded, rel=5e-3)
 
 
+@pytest.mark.verify
 def test_the_swimmer_rises_as_far_with_each_beat():
     bonded, whole = both("swimming", 0.6, lambda s: s.bodies["hub"].position[2], "rods.arm.stations=79", SECOND_ORDER)
     assert whole == pytest.approx(bonded, rel=0.01)
 
 
+@pytest.mark.verify
 def test_the_gripper_touches_the_ball_at_the_same_time_and_lifts_it_as_high():
     bonded, whole = both("gripping", 17.5, lambda s: s.summary()["bodies"]["ball"])
     assert whole["first_contact"] == pytest.approx(bonded["first_contact"], abs=0.05)

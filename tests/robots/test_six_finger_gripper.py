@@ -31,11 +31,11 @@ def yaw(simulator):
     [
         {},
         {"model": "two_rod"},
-        {"tolerance": 1e-3},
-        {"tolerance": 1e-5},
-        {"integrator": "sdirk2"},
-        {"integrator": "generalised_alpha"},
-        {"integrator": "implicit_euler", "dt": 5e-3},
+        pytest.param({"tolerance": 1e-3}, marks=pytest.mark.verify),
+        pytest.param({"tolerance": 1e-5}, marks=pytest.mark.verify),
+        pytest.param({"integrator": "sdirk2"}, marks=pytest.mark.verify),
+        pytest.param({"integrator": "generalised_alpha"}, marks=pytest.mark.verify),
+        pytest.param({"integrator": "implicit_euler", "dt": 5e-3}, marks=pytest.mark.verify),
     ],
     ids=str,
 )

@@ -180,7 +180,7 @@ def test_a_path_of_many_turns_on_each_other_is_refused_in_time_and_memory(turns,
     assert reason in refusal(scene([rod([layer()]) | {"path": arc}]))
 
 
-@pytest.mark.slow
+@pytest.mark.verify
 def test_as_many_elements_as_a_light_may_have_are_built_in_time():
     light = {"sun": {"light": {"from": [0, 0, 1], "shadow": True}, "schedule": {"type": "hold", "value": 1.0}}}
     sheet = layer(eigenstrain={"stimulus": "sun", "gain": 0.01, "time_constant": 1.0})
@@ -197,7 +197,6 @@ def test_points_too_unevenly_spaced_for_a_curve_are_refused():
     assert "points[1]: found [0.001, 0.0, 0.0]; must be 1e+11 m or more" in text
 
 
-@pytest.mark.slow
 def test_as_many_rods_that_may_meet_as_there_may_be_are_built_in_time():
     pattern = {"type": "translation", "step": [0, 0.02, 0], "count": MOST_COPIES}
     arms = rod([layer("a"), layer("b")], stations=5, clamp_start="hub") | {"pattern": pattern}

@@ -27,6 +27,12 @@ def test_a_scene_with_every_part_is_read_back_the_same_from_its_text():
     assert parse_scene(scene_text(config), "text") == config
 
 
+@pytest.mark.parametrize("title", ["next\x85line", "\u2028 \ufeff: #", "😀 - 中\xa0", "yes", "~", "1e5"])
+def test_any_title_is_read_back_the_same_from_its_text(title):
+    config = load_scene(scene([rod([layer()])], title=title))
+    assert parse_scene(scene_text(config), "text").title == title
+
+
 @given(
     st.tuples(*[st.floats(-1e3, 1e3)] * 3).filter(lambda v: math.hypot(*v) > 1e-6),
     st.floats(1e-9, 1e9, exclude_min=True),

@@ -21,7 +21,6 @@ from bilayer_core.verification.stress.stress_case import Outcome, Record, Stress
 ONE = "restitution/0.5/ball/laminate"
 
 
-@pytest.mark.slow
 def test_results_report_and_scenes_are_written_and_gone_on_with(tmp_path, capfd):
     out = tmp_path / "stress"
     table = tmp_path / "all.json"
@@ -72,8 +71,9 @@ def test_a_last_line_that_was_cut_off_is_done_again(tmp_path):
 
 
 def hangs(trial):
-    while True:
-        pass
+    import time
+
+    time.sleep(1e4)
 
 
 def takes_all_memory(trial):
@@ -92,7 +92,6 @@ def fine(trial):
     return Decision("nothing", 1.0, 0.0, 2.0)
 
 
-@pytest.mark.slow
 def test_cases_that_hang_die_or_take_all_memory_fail_and_the_rest_goes_on(monkeypatch):
     monkeypatch.setattr(pool, "LEAST_TIME", 15.0)
     content = partial(scene_of, Parameters(stations=5))
@@ -108,11 +107,10 @@ def test_cases_that_hang_die_or_take_all_memory_fail_and_the_rest_goes_on(monkey
     assert outcomes == dict.fromkeys(("hangs", "memory", "dies"), Outcome.FAILED) | {"fine": Outcome.ACCURATE}
 
 
-@pytest.mark.slow
 def test_a_failure_is_made_smaller_and_runs_again(tmp_path):
     hard = Parameters(robot="drop", stations=15, friction=1.0, youngs_modulus=2e7)
     case = StressCase("hard", partial(scene_of, hard), decide=partial(is_stiff, 1.5e7))
-    path = shrink(case, Record("hard", "", True, [], Outcome.FAILED, "stiff: too much: of it"), tmp_path, 1)
+    path = shrink(case, Record("hard", "", True, [], Outcome.FAILED, "stiff: too much: of it"), tmp_path)
     text = path.read_text()
     assert "youngs_modulus: 20000000.0" in text  # without it nothing fails
     assert "stations: 5" in text and "coefficient: 0.4" in text  # all else is at its default, or less
@@ -125,15 +123,15 @@ def is_stiff(limit, trial):
     return Decision("stiff: too much", stiffness, 0.0, limit)
 
 
-@pytest.mark.slow
 def test_an_interrupted_run_ends_at_once_and_keeps_what_it_has(tmp_path):
     import signal
     import time
 
     command = [sys.executable, "-m", "bilayer_core", "stress", "--only", "integrator/sdirk2/*", "--out", str(tmp_path)]
+    command += ["--workers", "1"]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     results = Path(tmp_path) / "results.jsonl"
-    while not results.exists() or len(results.read_text().splitlines()) < 2:
+    while not results.exists() or len(results.read_text().splitlines()) < 2:  # its head, and a case
         assert process.poll() is None
         time.sleep(0.1)
     process.send_signal(signal.SIGINT)

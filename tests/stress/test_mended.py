@@ -22,14 +22,12 @@ MENDED = {
     "all/1530": "likewise",
     "all/0769": "noise on a stimulus excused steps that made energy",
 }
-
-
+QUICK = ("all/0010", "all/0222")
 CPU_LIMIT = 5.0
 """Of each run of a case [s]: all of them failed sooner."""
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", MENDED)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in QUICK else pytest.mark.verify) for n in MENDED])
 def test_what_failed_once_does_not(name):
     record = execute(replace(all_cases()[name], cpu_limit=CPU_LIMIT))
     assert record.outcome is not Outcome.FAILED, record.reason

@@ -23,7 +23,7 @@ def run(description, duration, dt, velocity=None, integrator="implicit_euler"):
 def throw(simulator, velocity):
     """Give all nodes velocities [m/s], shape (n_node, 3); the budget starts anew."""
     state = simulator.save_state()
-    parts = simulator.description.state_layout
+    parts = simulator._state.layout()
     sizes = [int(np.prod(shape)) for _, shape in parts]
     start = sum(sizes[: [name for name, _ in parts].index("velocity")])
     state[start : start + velocity.size] = np.asarray(velocity).ravel()

@@ -98,7 +98,7 @@ def falling(obstacles=(GROUND,), **solver):
 def part(simulator, name):
     """A part of the state."""
     state, start = simulator.save_state(), 0
-    for own, shape in simulator.description.state_layout:
+    for own, shape in simulator._state.layout():
         size = math.prod(shape)
         if own == name:
             return state[start : start + size].reshape(shape)
@@ -109,7 +109,7 @@ def part(simulator, name):
 def with_parts(simulator, **values):
     """Put parts of the state to values."""
     state, start = simulator.save_state(), 0
-    for own, shape in simulator.description.state_layout:
+    for own, shape in simulator._state.layout():
         size = math.prod(shape)
         if own in values:
             state[start : start + size] = np.asarray(values[own]).ravel()

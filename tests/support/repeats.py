@@ -31,7 +31,7 @@ def _numbers(motion):
 def differences(simulator, state, told=None):
     """Parts of the state, and figures, in which a simulator is not what it should be."""
     found, own, begin = [], simulator.save_state(), 0
-    for name, shape in simulator.description.state_layout:
+    for name, shape in simulator._state.layout():
         end = begin + int(np.prod(shape))
         if not np.array_equal(own[begin:end], state[begin:end], equal_nan=True):
             found.append(name)

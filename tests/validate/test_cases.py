@@ -15,7 +15,7 @@ from bilayer_core.verification.validate.validation_case import Case
 
 
 @pytest.mark.parametrize(
-    "case", [pytest.param(case, id=case.name, marks=[pytest.mark.slow] if case.long else []) for case in CASES]
+    "case", [pytest.param(case, id=case.name, marks=[pytest.mark.verify] if case.long else []) for case in CASES]
 )
 def test_the_answer_is_met(case):
     result = case.run()

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
-from concurrent.futures import FIRST_COMPLETED, wait
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import contextmanager
 from pathlib import Path
 
 from bilayer_core.processes import side_by_side
@@ -33,27 +34,42 @@ def run_cases(cases: Iterable[StressCase], workers: int, done: Callable[[Record]
     done : callable
         Called with each record.
     """
-    from pebble import ProcessExpired
-
     left = list(reversed(list(cases)))
-    with side_by_side(workers, CASES_A_WORKER, _limit_memory) as schedule:
+    with _started(workers) as begin:
         waiting = {}
         while left or waiting:
             while left and len(waiting) < 2 * workers:
                 case = left.pop()
-                waiting[schedule(_run, case, timeout=_time_of(case))] = case
+                waiting[begin(case)] = case
             finished, _ = wait(waiting, return_when=FIRST_COMPLETED)
             for job in finished:
-                case = waiting.pop(job)
-                try:
-                    record = Record.from_line(job.result())
-                except TimeoutError:
-                    record = _lost(case, f"took longer than {_time_of(case):g} s, and was killed")
-                except ProcessExpired as death:
-                    record = _lost(case, f"its process died with exit code {death.exitcode}")
-                except Exception as fault:  # of the worker, such as no memory while it tells what came
-                    record = _lost(case, f"{type(fault).__name__}: {fault}")
-                done(record)
+                done(_record_of(job, waiting.pop(job)))
+
+
+@contextmanager
+def one_by_one() -> Iterator[Callable[[StressCase], Record]]:
+    """Start a process for cases of which each depends on what came of the one before; yield what runs one."""
+    with _started(1) as begin:
+        yield lambda case: _record_of(begin(case), case)
+
+
+@contextmanager
+def _started(workers: int) -> Iterator[Callable[[StressCase], Future]]:
+    with side_by_side(workers, CASES_A_WORKER, _limit_memory) as schedule:
+        yield lambda case: schedule(_run, case, timeout=_time_of(case))
+
+
+def _record_of(job: Future, case: StressCase) -> Record:
+    from pebble import ProcessExpired
+
+    try:
+        return Record.from_line(job.result())
+    except TimeoutError:
+        return _lost(case, f"took longer than {_time_of(case):g} s, and was killed")
+    except ProcessExpired as death:
+        return _lost(case, f"its process died with exit code {death.exitcode}")
+    except Exception as fault:  # of the worker, such as no memory while it tells what came
+        return _lost(case, f"{type(fault).__name__}: {fault}")
 
 
 def _time_of(case: StressCase) -> float:

@@ -10,7 +10,7 @@ import yaml
 
 from bilayer_core.log.file.output_paths import write_text
 from bilayer_core.verification.stress.parameters import Parameters
-from bilayer_core.verification.stress.pool import run_cases
+from bilayer_core.verification.stress.pool import one_by_one
 from bilayer_core.verification.stress.robots import scene_of
 from bilayer_core.verification.stress.stress_case import Outcome, Record, StressCase
 
@@ -23,24 +23,24 @@ def is_shrinkable(case: StressCase) -> bool:
     return isinstance(case.content, functools.partial)
 
 
-def shrink(case: StressCase, record: Record, directory: Path, workers: int) -> Path:
+def shrink(case: StressCase, record: Record, directory: Path) -> Path:
     """Write the smallest scene found that fails as the case does.
 
     Greedy: in rounds, each setting is tried at its default, alone, on top of what was taken back before.
     """
     parameters: Parameters = case.content.args[0]
     kind, smallest = _kind(record), record
-    for _ in range(ROUNDS):
-        before = parameters
-        for change in _taken_back(parameters):
-            candidate = dataclasses.replace(parameters, **change)
-            found = _run_again(case, candidate, workers)
-            if found.outcome is Outcome.FAILED and _kind(found) == kind:
-                parameters, smallest = candidate, found
-        if parameters == before:
-            break
-    content = functools.partial(scene_of, parameters)
-    return write_scene(dataclasses.replace(case, content=content), smallest, directory)
+    with one_by_one() as run:
+        for _ in range(ROUNDS):
+            before = parameters
+            for change in _taken_back(parameters):
+                candidate = dataclasses.replace(parameters, **change)
+                found = run(_with(case, candidate, compared=False))
+                if found.outcome is Outcome.FAILED and _kind(found) == kind:
+                    parameters, smallest = candidate, found
+            if parameters == before:
+                break
+    return write_scene(_with(case, parameters), smallest, directory)
 
 
 def _kind(record: Record) -> str:
@@ -59,11 +59,8 @@ def _taken_back(parameters: Parameters) -> list[dict[str, object]]:
     return changes
 
 
-def _run_again(case: StressCase, parameters: Parameters, workers: int) -> Record:
-    found: list[Record] = []
-    again = dataclasses.replace(case, content=functools.partial(scene_of, parameters), compared=False)
-    run_cases([again], workers, found.append)
-    return found[0]
+def _with(case: StressCase, parameters: Parameters, **changes: bool) -> StressCase:
+    return dataclasses.replace(case, content=functools.partial(scene_of, parameters), **changes)
 
 
 def write_scene(case: StressCase, record: Record, directory: Path, before: str = "") -> Path:

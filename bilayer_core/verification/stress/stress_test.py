@@ -72,7 +72,7 @@ def write(cases: dict[str, StressCase], journal: Journal, directory: Path, shrin
     failed = [record for record in records if record.outcome is Outcome.FAILED]
     for record in failed[:MOST_SHRUNK] if shrinks else ():
         if is_shrinkable(cases[record.name]):
-            written.append(shrink(cases[record.name], record, directory / "failures", workers))
+            written.append(shrink(cases[record.name], record, directory / "failures"))
     made_here = [record for record in records if not isinstance(cases[record.name].content, str)]
     for number, record in enumerate(stability_page.worst(made_here, WORST), 1):
         written.append(write_scene(cases[record.name], record, directory / "worst", f"{number:02d}_"))
