@@ -62,7 +62,7 @@ def stress(
         compile_kernels(quiet)
         with count_bar(len(cases) - len(journal.records), quiet) as show:
             measure(cases, journal, workers, lambda record: _tell(record, show))
-        for path in write(cases, journal, directory, shrink, workers):
+        for path in write(cases, journal, directory, shrink):
             say(f"wrote {path}")
         records = list(journal.records.values())
         write_json(_as_json(journal))

@@ -18,6 +18,7 @@ from bilayer_core.verification.bench import (
     problems,
     run_benchmark,
     tables,
+    work_precision,
 )
 from bilayer_core.verification.bench.configurations import Configuration, Family, families
 
@@ -60,17 +61,18 @@ def small(monkeypatch):
     monkeypatch.setattr(cantilever, "find_spec", lambda name: None)
 
 
-def test_two_problems_are_measured_into_json_tables_and_plots(small, tmp_path, capsys):
+def test_two_problems_are_measured_into_json_tables_and_plots(small, tmp_path, capsys, monkeypatch):
+    chosen = [family for family in families(problems.PROBLEMS[0].config()) if family.dimension == 2]
+    monkeypatch.setattr(work_precision, "families", lambda *_: chosen)
     out = tmp_path / "out"
-    chosen = ["--only", "cantilever", "--only", "snap", "--only", "peers"]
-    assert main(["bench", "--out", str(out), *chosen]) == 0
+    parts = ["--only", "cantilever", "--only", "snap", "--only", "peers"]
+    assert main(["bench", "--out", str(out), *parts]) == 0
     printed = capsys.readouterr().out
     assert "pyelastica: skipped, it is not installed; pip install 'bilayer_sim_ros[bench]'" in printed
     content = json.loads((out / "bench.json").read_text())
     runs = content["work_precision"]
-    all_families = families(problems.PROBLEMS[0].config())
-    further = sum(family.integrator == "implicit_euler" and not family.adaptive for family in all_families)
-    expected = 2 * (sum(1 if family.adaptive else 2 for family in all_families) + further)
+    further = sum(family.integrator == "implicit_euler" and not family.adaptive for family in chosen)
+    expected = 2 * (sum(1 if family.adaptive else 2 for family in chosen) + further)
     assert len(runs) == expected and {run["outcome"] for run in runs} == {"done"}
     assert all(0.0 < run["error"] < 1.0 and run["cpu_time"] > 0.0 for run in runs)
     assert content["machine"]["cores"] >= 1 and len(content["began"]["load"]) == 3
@@ -87,6 +89,7 @@ def test_two_problems_are_measured_into_json_tables_and_plots(small, tmp_path, c
 
 
 def test_results_that_are_there_are_refused_kept_or_replaced_as_asked(small, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(work_precision, "families", lambda *_: [FAMILY])
     arguments = ["bench", "--out", str(tmp_path), "--only", "snap"]
     assert main(arguments) == 0
     before = json.loads((tmp_path / "bench.json").read_text())["work_precision"]

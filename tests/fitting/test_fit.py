@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from benchmarks.fit_coverage import PARAMETERS, SCENE, TIP, TRUTH, exact_data
+from benchmarks.fit_coverage import PARAMETERS, TIMES, TIP, TRUTH
+from benchmarks.fit_coverage import SCENE as STUDIED
 
 import bilayer_core
 from bilayer_core import Simulator, fit, load_scene
@@ -11,6 +12,8 @@ from bilayer_core.studies.fitting import fit as whole
 from bilayer_core.studies.fitting.identify import NotIdentifiable
 from bilayer_core.studies.fitting.runs import Runs, known_quantities
 
+SCENE = STUDIED | {"solver": {"dimension": 3}}
+"""In space, where no run builds a second model to see whether it would leave its plane."""
 MODULUS, GAIN = TRUTH
 NOISE = 0.5e-3
 ONE = {GAIN: PARAMETERS[GAIN]}
@@ -19,7 +22,7 @@ ONE = {GAIN: PARAMETERS[GAIN]}
 
 @pytest.fixture(scope="module")
 def exact():
-    return exact_data()
+    return data_of(load_scene(SCENE), TIMES, [f"{TIP}.x", f"{TIP}.z"])
 
 
 @pytest.fixture(scope="module")

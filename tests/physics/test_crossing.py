@@ -41,7 +41,7 @@ def over_spike(stations, **more):
 @pytest.mark.parametrize("kind", ["sphere", "box", "cylinder"])
 def test_edges_cross_a_shape_where_a_point_of_them_is_inside(kind):
     rng, counts = np.random.default_rng(3), [0, 0]
-    for _ in range(400):
+    for _ in range(150):
         rounding = 0.2 if kind == "sphere" else rng.choice([0.0, 0.05])
         turn, place = rotation_matrix(rng.standard_normal(3)), rng.uniform(-0.1, 0.1, 3)
         nodes = rng.uniform(-0.6, 0.6, (3, 3))

@@ -80,7 +80,12 @@ def test_works_of_all_that_drives_and_damps_are_in_the_account(model, integrator
 
 @pytest.mark.parametrize(
     ("model", "dimension", "gravity", "joined"),
-    [("laminate", 2, -9.81, True), ("laminate", 3, 0.0, True), ("laminate", 3, -9.81, False), ("two_rod", 3, 0.0, False)],
+    [
+        ("laminate", 2, -9.81, True),
+        ("laminate", 3, 0.0, True),
+        ("laminate", 3, -9.81, False),
+        ("two_rod", 3, 0.0, False),
+    ],
 )
 def test_a_prescribed_body_that_shifts_and_turns_supplies_its_work(model, dimension, gravity, joined):
     motion = {"times": [0, 0.02, 0.04], "displacements": [[0, 0, 0], [0, 0, 0.01], [0.01, 0, 0.01]]}

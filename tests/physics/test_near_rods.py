@@ -66,7 +66,7 @@ def test_near_pairs_of_a_rod_that_winds_and_moves_are_all_that_come_near(layers)
     arc = surfaces.point_arc[:, None]
     sees = np.maximum(surfaces.edge_arc[:, 0] - arc, arc - surfaces.edge_arc[:, 1]) >= exclusion
     met = 0
-    for _ in range(40):
+    for _ in range(15):
         base = np.concatenate([winding_path(rng, stations, spacing) + [0, 0, 1e-3 * k] for k in range(layers)])
         tip = base + np.tile(winding_path(rng, stations, spacing) * rng.choice([0.0, 0.1, 1.0]), (layers, 1))
         pairs.find(base, D_HAT, reach, tip)

@@ -100,7 +100,7 @@ def test_a_blade_in_a_plane_is_told_where_it_would_turn_over(model, part, outwar
     bending, shear = modulus * thickness * width**3 / 12.0, modulus / 3.0
     torsion = shear * thickness * width**3 / 3.0 * (1.0 - 0.63 * width / thickness)
     force = part * 4.013 * np.sqrt(bending * torsion) / length**2
-    blade = rod([layer(thickness=thickness)], length, 81, width=width, clamp_start="wall")
+    blade = rod([layer(thickness=thickness)], length, 41, width=width, clamp_start="wall")
     load = {"name": "tip", "rod": "rod", "position": length, "force": [0, 0, -force]}
     content = scene([blade], bodies=[fixed()], loads=[load])
     report = Simulator(load_scene(content), model=model, dimension=2).solve_static()

@@ -9,7 +9,7 @@ from support.sample_scenes import HALF_SIZES, contact, layer, rod, scene
 from bilayer_core import load_scene
 from bilayer_core.contact.near import gap_normal, list_near
 from bilayer_core.contact.step_bound import KEPT_FRACTION, motion_of_points, step_bound
-from bilayer_core.jit import kernel, record_at
+from bilayer_core.jit import piece
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.build_model import build_model
 from bilayer_core.model.records.contacts import RodPoints, Surfaces
@@ -19,32 +19,31 @@ from bilayer_core.model.records.step import Configuration
 from bilayer_core.model.shape_numbers import NUMBER
 from bilayer_core.model.state import initial_state
 
-surfaces_at, strands_at, bodies_at = record_at(Surfaces), record_at(Strands), record_at(Bodies)
-configuration_at, system_at = record_at(Configuration), record_at(System)
+
+@piece(float, Surfaces, Configuration, int, int)
+def tested_gap(surfaces, at, i, s):
+    point = at.contact_point
+    return gap_normal(surfaces, at, surfaces.radius[i], s, point[i, 0], point[i, 1], point[i, 2])[0]
 
 
-@kernel
-def gap_between(surfaces, at, i, s):
-    point, configuration = configuration_at(at).contact_point, configuration_at(at)
-    radius = surfaces_at(surfaces).radius[i]
-    return gap_normal(surfaces_at(surfaces), configuration, radius, s, point[i, 0], point[i, 1], point[i, 2])[0]
+@piece(float, Surfaces, Strands, System, Configuration)
+def tested_bound(surfaces, strands, system, at):
+    return step_bound(surfaces, strands, system, at, np.inf)[0]
 
 
-@kernel
-def bound_of(surfaces, strands, system, at, closing):
-    return step_bound(surfaces_at(surfaces), strands_at(strands), system_at(system), configuration_at(at), closing)
+@piece(int, Surfaces, Strands, System, Configuration)
+def tested_blocking(surfaces, strands, system, at):
+    return step_bound(surfaces, strands, system, at, np.inf)[1]
 
 
-@kernel
-def motion_of(surfaces, bodies, strands, system, at):
-    return motion_of_points(
-        surfaces_at(surfaces), bodies_at(bodies), strands_at(strands), system_at(system), configuration_at(at)
-    )
+@piece(float, Surfaces, Bodies, Strands, System, Configuration)
+def tested_motion(surfaces, bodies, strands, system, at):
+    return motion_of_points(surfaces, bodies, strands, system, at)
 
 
-@kernel
-def count_near(surfaces, at, margin):
-    return list_near(surfaces_at(surfaces), configuration_at(at), margin)
+@piece(int, Surfaces, Configuration, float)
+def tested_list(surfaces, at, margin):
+    return list_near(surfaces, at, margin)
 
 
 class Pair:
@@ -95,13 +94,12 @@ class Pair:
         )
 
     def gap(self, t):
-        at = self.at(t)
-        return gap_between(self.surfaces.address, at.address, 0, 0)
+        return tested_gap(self.surfaces, self.at(t), 0, 0)
 
     def bound(self):
-        at, system = self.at(0.0), record_of(System, node_step=self.step, motion=self.motion)
-        strands = Strands.absent()
-        return bound_of(self.surfaces.address, strands.address, system.address, at.address, np.inf)
+        system = record_of(System, node_step=self.step, motion=self.motion)
+        records = self.surfaces, Strands.absent(), system, self.at(0.0)
+        return tested_bound(*records), tested_blocking(*records)
 
 
 class Border:
@@ -192,16 +190,15 @@ class Border:
         )
 
     def gap(self, t):
-        at = self.at(t)
-        return gap_between(self.surfaces.address, at.address, 3, 0)
+        return tested_gap(self.surfaces, self.at(t), 3, 0)
 
     def bound(self):
         records = self.surfaces, self.strands, self.system, self.at(0.0)
-        return bound_of(*(record.address for record in records), np.inf)
+        return tested_bound(*records), tested_blocking(*records)
 
     def largest_motion(self):
         records = self.surfaces, Bodies.absent(), self.strands, self.system, self.at(0.0)
-        return motion_of(*(record.address for record in records))
+        return tested_motion(*records)
 
 
 def bound_that_keeps_the_gap(pair, start, samples):
@@ -218,12 +215,12 @@ def bound_that_keeps_the_gap(pair, start, samples):
 def test_step_bound_is_the_first_moment_at_which_a_gap_shrinks_to_the_kept_fraction(kind, turning):
     rng = np.random.default_rng(4)
     limited = 0
-    for _ in range(40):
+    for _ in range(80):
         pair = Pair(kind, rng, turning)
         start = pair.gap(0.0)
         if start <= 0.0:
             continue
-        alpha = bound_that_keeps_the_gap(pair, start, 60)
+        alpha = bound_that_keeps_the_gap(pair, start, 30)
         if alpha < 1.0:
             limited += 1
             assert pair.gap(alpha) == pytest.approx(KEPT_FRACTION * start, abs=1e-5 * start)
@@ -301,12 +298,9 @@ def test_a_list_of_near_pairs_holds_what_is_near_and_the_nearest():
             **{name: np.zeros(shape) for name, shape in then.items()},
         )
         gaps = {
-            (s, i): gap_between(surfaces.address, at.address, i, s)
-            for s in range(4)
-            for i in range(300)
-            if can_collide[s, group[i]]
+            (s, i): tested_gap(surfaces, at, i, s) for s in range(4) for i in range(300) if can_collide[s, group[i]]
         }
-        count = count_near(surfaces.address, at.address, 0.02)
+        count = tested_list(surfaces, at, 0.02)
         pairs = list(
             zip(*(listed[name][:count].tolist() for name in ("near_surface", "near_contact_point")), strict=True)
         )

@@ -10,7 +10,7 @@ import pytest
 
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
-from bilayer_core.verification.stress import pool
+from bilayer_core.verification.stress import outcome_pictures, pool
 from bilayer_core.verification.stress.journal import Journal
 from bilayer_core.verification.stress.parameters import Parameters
 from bilayer_core.verification.stress.pool import run_cases
@@ -21,7 +21,7 @@ from bilayer_core.verification.stress.stress_case import Outcome, Record, Stress
 ONE = "restitution/0.5/ball/laminate"
 
 
-def test_results_report_and_scenes_are_written_and_gone_on_with(tmp_path, capfd):
+def test_results_report_and_scenes_are_written_and_gone_on_with(tmp_path, capfd, monkeypatch):
     out = tmp_path / "stress"
     table = tmp_path / "all.json"
     assert main(["stress", "--only", ONE, "--out", str(out), "--json", str(table), "--workers", "1"]) == 0
@@ -33,6 +33,7 @@ def test_results_report_and_scenes_are_written_and_gone_on_with(tmp_path, capfd)
     page = (out / "stability.md").read_text()
     assert "| inside | 1 | 1 | 0 | 0 | 0 |" in page and "## Seeded bugs" in page and "capstan" in page
     before = (out / "results.jsonl").read_text()
+    monkeypatch.setattr(outcome_pictures, "draw", lambda records, directory: [])
     assert main(["stress", "--only", ONE, "--out", str(out), "--resume", "--workers", "1"]) == 0
     assert (out / "results.jsonl").read_text() == before  # nothing was left to do
     (scene,) = (out / "worst").iterdir()
@@ -123,6 +124,7 @@ def is_stiff(limit, trial):
     return Decision("stiff: too much", stiffness, 0.0, limit)
 
 
+@pytest.mark.verify
 def test_an_interrupted_run_ends_at_once_and_keeps_what_it_has(tmp_path):
     import signal
     import time

@@ -63,9 +63,8 @@ def test_each_limit_of_the_region_is_named(changes, why):
     assert any(why in reason for reason in outside(Parameters(**changes)))
 
 
-@pytest.mark.slow
-def test_every_case_is_a_scene_that_loads():
-    for case in matrix():
+def test_every_tenth_case_is_a_scene_that_loads():
+    for case in matrix()[::10]:
         scene = load_scene(scene_of(case.parameters))
         assert len(scene.rods[0].layers) == 2 and scene.rods[0].stations == case.parameters.stations
 

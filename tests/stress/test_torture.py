@@ -23,8 +23,8 @@ from bilayer_core.verification.validate.closed_forms import end_loaded_cantileve
 X = np.array([1.0, 0.0, 0.0])
 SLOW = {7, 8, 16}
 """Numbers of those of which every rung takes four seconds or more."""
-QUICK_AT_LAST = {3}
-"""Numbers of those whose first rung is the slow one."""
+QUICK_AT_LAST = {1, 2, 3, 15}
+"""Numbers of those whose first rung is the slower one."""
 
 
 def two_rungs_each():

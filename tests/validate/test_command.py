@@ -72,7 +72,7 @@ def test_one_command_makes_figure_3_and_its_tables(tmp_path, capsys):
     assert (tmp_path / "validation.md").read_text().startswith("### bending")
 
 
-@pytest.mark.slow
+@pytest.mark.verify
 def test_figure_4_is_drawn(tmp_path):
     assert main(["validate", "--only", "helix/layers (100, 50)", "--out", str(tmp_path)]) == 0
     assert_drawn(tmp_path / "fig4.png")

@@ -65,8 +65,8 @@ def measure(cases: dict[str, StressCase], journal: Journal, workers: int, tell: 
     run_cases([case for name, case in cases.items() if name not in journal.records], workers, done)
 
 
-def write(cases: dict[str, StressCase], journal: Journal, directory: Path, shrinks: bool, workers: int) -> list[Path]:
-    """Write the stability_page, its outcome_pictures, and the scenes of failures and of the worst cases."""
+def write(cases: dict[str, StressCase], journal: Journal, directory: Path, shrinks: bool) -> list[Path]:
+    """Write the page of stability, its pictures, and the scenes of failures and of the worst cases."""
     written = []
     records = list(journal.records.values())
     failed = [record for record in records if record.outcome is Outcome.FAILED]

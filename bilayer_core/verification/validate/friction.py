@@ -232,6 +232,7 @@ CASES = [
             limit,
             lambda solver=solver: error_on_a_belt(dict(solver)),
             scale=1.0,
+            long=not solver,
         )
         for solver, limit in (
             ({}, 0.02),

@@ -121,7 +121,8 @@ def _case(pitch_angle: float, model: str, pairs: bool, figure: str, limit: float
         return compliance(pitch_angle, model, pairs)[row, column], expected(pitch_angle)[row, column]
 
     name = f"paths/spring of {pitch_angle:g}°, {'two layers' if pairs else 'one layer'}, {model}/{figure}"
-    return Case(name, "Kirchhoff's theory for small loads", limit, measure, unit, scale)
+    long = model == "two_rod" and pitch_angle < PITCH_ANGLES[-1]
+    return Case(name, "Kirchhoff's theory for small loads", limit, measure, unit, scale, long)
 
 
 def order_in_space() -> tuple[float, float]:
