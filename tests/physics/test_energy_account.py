@@ -47,7 +47,7 @@ def test_a_strip_that_falls_never_rebounds_with_more_than_it_had(integrator, dt)
     assert largest < 1.001 * start
 
 
-@pytest.mark.parametrize("integrator", METHODS[:4])
+@pytest.mark.parametrize("integrator", ["sdirk2", "generalised_alpha"])
 def test_numerical_energy_is_that_of_the_energy_budget(integrator):
     arm = rod([layer("bottom"), layer("top")], length=0.06, stations=11, clamp_start="wall")
     solver = {"integrator": integrator, "dt": 5e-4, "newton_tolerance": 1e-10}

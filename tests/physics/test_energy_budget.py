@@ -90,8 +90,14 @@ CLAMPED, FLYING = (driven(gravity=[0, 0, -9.81]), 4.0), (flyer(), 2.0)  # what a
 
 @pytest.mark.parametrize(
     ("description", "quadrature", "integrator"),
-    [pytest.param(*CLAMPED, name, id=f"clamped-{name}") for name in INTEGRATORS]
-    + [pytest.param(*FLYING, name, id=f"flying-{name}") for name in ("sdirk2", "implicit_midpoint")],
+    [
+        pytest.param(*scene_, name, id=f"{of}-{name}", marks=() if name in quick else pytest.mark.verify)
+        for of, scene_, quick in (
+            ("clamped", CLAMPED, ("implicit_euler", "tr_bdf2", "implicit_midpoint")),
+            ("flying", FLYING, ("sdirk2", "generalised_alpha")),
+        )
+        for name in INTEGRATORS
+    ],
 )
 def test_budget_of_a_driven_bilayer_closes_and_its_numerical_loss_has_the_order(description, quadrature, integrator):
     budgets = [run(description, 0.15, dt, integrator=integrator).budget() for dt in (1e-3, 2.5e-4)]

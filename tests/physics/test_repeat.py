@@ -41,7 +41,8 @@ def interfere(simulator, number):
         simulator.set_pose("hub", [chance.uniform(-1e-3, 1e-3), 0.0, 0.0425], over=0.01)
 
 
-@EACH
+@pytest.mark.verify  # of what is not interfered with, which is less
+@pytest.mark.parametrize("chosen", COMBINATIONS, ids=lambda chosen: "-".join(map(str, chosen)))
 def test_a_run_goes_on_bit_for_bit_from_any_step(chosen):
     simulator = assert_goes_on(lambda: crowded_simulator(*chosen), 0.6 * DURATION)
     assert {"joints", "barrier", "friction"} <= set(simulator.model.forces)

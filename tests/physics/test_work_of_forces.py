@@ -224,6 +224,7 @@ def test_lifting_a_strip_takes_its_weight_times_the_height():
     assert work == pytest.approx(9.81 * 1000.0 * 0.01 * 1e-3 * 0.05 * 0.02, rel=1e-3)
 
 
+@pytest.mark.verify
 def test_a_prescribed_ball_that_pushes_a_free_one_gives_it_its_energy():
     away = rod([layer()], length=0.02, stations=3, start=(0, 5, 5), clamp_start="wall")
     pusher = {**moving("pusher", (-0.0411, 0, 0), (0.05, 0, 0), 0.1), "surface": {"shape": "sphere", "radius": 0.02}}
