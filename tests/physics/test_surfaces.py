@@ -21,28 +21,28 @@ from bilayer_core.model.state import initial_state
 
 
 @piece(float, Surfaces, Configuration, int, int)
-def tested_gap(surfaces, at, i, s):
+def gap_tested(surfaces, at, i, s):
     point = at.contact_point
     return gap_normal(surfaces, at, surfaces.radius[i], s, point[i, 0], point[i, 1], point[i, 2])[0]
 
 
 @piece(float, Surfaces, Strands, System, Configuration)
-def tested_bound(surfaces, strands, system, at):
+def bound_tested(surfaces, strands, system, at):
     return step_bound(surfaces, strands, system, at, np.inf)[0]
 
 
 @piece(int, Surfaces, Strands, System, Configuration)
-def tested_blocking(surfaces, strands, system, at):
+def blocking_tested(surfaces, strands, system, at):
     return step_bound(surfaces, strands, system, at, np.inf)[1]
 
 
 @piece(float, Surfaces, Bodies, Strands, System, Configuration)
-def tested_motion(surfaces, bodies, strands, system, at):
+def motion_tested(surfaces, bodies, strands, system, at):
     return motion_of_points(surfaces, bodies, strands, system, at)
 
 
 @piece(int, Surfaces, Configuration, float)
-def tested_list(surfaces, at, margin):
+def list_tested(surfaces, at, margin):
     return list_near(surfaces, at, margin)
 
 
@@ -94,12 +94,12 @@ class Pair:
         )
 
     def gap(self, t):
-        return tested_gap(self.surfaces, self.at(t), 0, 0)
+        return gap_tested(self.surfaces, self.at(t), 0, 0)
 
     def bound(self):
         system = record_of(System, node_step=self.step, motion=self.motion)
         records = self.surfaces, Strands.absent(), system, self.at(0.0)
-        return tested_bound(*records), tested_blocking(*records)
+        return bound_tested(*records), blocking_tested(*records)
 
 
 class Border:
@@ -190,15 +190,15 @@ class Border:
         )
 
     def gap(self, t):
-        return tested_gap(self.surfaces, self.at(t), 3, 0)
+        return gap_tested(self.surfaces, self.at(t), 3, 0)
 
     def bound(self):
         records = self.surfaces, self.strands, self.system, self.at(0.0)
-        return tested_bound(*records), tested_blocking(*records)
+        return bound_tested(*records), blocking_tested(*records)
 
     def largest_motion(self):
         records = self.surfaces, Bodies.absent(), self.strands, self.system, self.at(0.0)
-        return tested_motion(*records)
+        return motion_tested(*records)
 
 
 def bound_that_keeps_the_gap(pair, start, samples):
@@ -298,9 +298,9 @@ def test_a_list_of_near_pairs_holds_what_is_near_and_the_nearest():
             **{name: np.zeros(shape) for name, shape in then.items()},
         )
         gaps = {
-            (s, i): tested_gap(surfaces, at, i, s) for s in range(4) for i in range(300) if can_collide[s, group[i]]
+            (s, i): gap_tested(surfaces, at, i, s) for s in range(4) for i in range(300) if can_collide[s, group[i]]
         }
-        count = tested_list(surfaces, at, 0.02)
+        count = list_tested(surfaces, at, 0.02)
         pairs = list(
             zip(*(listed[name][:count].tolist() for name in ("near_surface", "near_contact_point")), strict=True)
         )
