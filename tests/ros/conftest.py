@@ -3,8 +3,6 @@
 import itertools
 import math
 import os
-import subprocess
-import sys
 import time
 
 import pytest
@@ -15,6 +13,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
+from support import forked
 from support.processes import claimed_domain
 
 NODE = "/bilayer_sim"
@@ -27,37 +26,32 @@ _numbers = itertools.count()
 class NodeProcess:
     """An executable of the package, running or ended, with everything that it printed."""
 
-    def __init__(self, module, directory, domain, parameters=None, arguments=()):
+    def __init__(self, module, directory, domain, parameters=None, arguments=(), program=""):
         self.domain = domain
-        command = [sys.executable, "-m", f"bilayer_sim_ros.{module}", *arguments]
+        arguments = [*map(str, arguments)]
         if parameters:
-            command += ["--ros-args"]
+            arguments += ["--ros-args"]
             for name, value in parameters.items():
-                command += ["-p", f"{name}:={str(value).lower() if isinstance(value, bool) else value}"]
-        self._output_path = directory / f"{module}-{next(_numbers)}.txt"
-        self._output = self._output_path.open("w")
-        self._process = subprocess.Popen(
-            command,
-            cwd=directory,
-            env=os.environ | {"ROS_DOMAIN_ID": str(domain)},
-            stdout=self._output,
-            stderr=subprocess.STDOUT,
-        )
+                arguments += ["-p", f"{name}:={str(value).lower() if isinstance(value, bool) else value}"]
+        self._output = directory / f"{module}-{next(_numbers)}.txt"
+        self._output.touch()
+        program += f"import sys\nfrom bilayer_sim_ros.{module} import main\nsys.exit(main())\n"
+        self._process = forked.start(program, arguments, domain, directory, self._output)
 
     @property
     def output(self) -> str:
-        return self._output_path.read_text()
+        return self._output.read_text()
 
     @property
     def running(self) -> bool:
-        return self._process.poll() is None
+        return self._process.exitcode is None
 
     @property
     def pid(self) -> int:
         return self._process.pid
 
     def send(self, number):
-        self._process.send_signal(number)
+        os.kill(self.pid, number)
 
     def wait_for(self, text):
         """Return once the output has `text`."""
@@ -68,17 +62,15 @@ class NodeProcess:
 
     def wait(self, limit=LIMIT) -> int:
         """Exit code."""
-        return self._process.wait(limit)
+        self._process.join(limit)
+        assert not self.running, f"the node does not end:\n{self.output}"
+        return self._process.exitcode
 
     def end(self):
-        if self.running:
-            self._process.terminate()
-        try:
-            self._process.wait(20)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
-        self._output.close()
+        self._process.terminate()
+        self._process.join(20)
+        self._process.kill()
+        self._process.join()
 
 
 class Client:
@@ -192,10 +184,13 @@ def residents():
 
 @pytest.fixture(scope="module")
 def start(tmp_path_factory, residents):
-    """Starts executables of the package in a domain; they end with the fixture that gave the domain."""
+    """Starts executables of the package in a domain, after a program that changes them; they end with the fixture that
+    gave the domain.
+    """
 
-    def begin(module, domain, parameters=None, arguments=()):
-        residents.append(NodeProcess(module, tmp_path_factory.mktemp("node"), domain, parameters, arguments))
+    def begin(module, domain, parameters=None, arguments=(), program=""):
+        directory = tmp_path_factory.mktemp("node")
+        residents.append(NodeProcess(module, directory, domain, parameters, arguments, program))
         return residents[-1]
 
     return begin

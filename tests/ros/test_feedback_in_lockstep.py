@@ -1,9 +1,6 @@
 """Feedback in lockstep: each tick has a frame, and the same run comes out however late and slow the controller is."""
 
-import os
 import signal
-import subprocess
-import sys
 import threading
 import time
 from contextlib import contextmanager
@@ -27,10 +24,10 @@ from bilayer_sim_ros.publishing.run_files import Recording
 LOCKSTEP = {"lockstep": True, "real_time_factor": 0.0}
 BEAT = {"period": 0.08, "tolerance": 1e-5, "axis": [0.0, 0.0, -1.0], "goal": [0.0, 0.0, -0.01]}
 SLOWED = """
-import random, sys, time
-from bilayer_sim_ros.controllers.goal_controller import GoalController, main
+import random, time
+from bilayer_sim_ros.controllers.goal_controller import GoalController
 
-chance, longest = random.Random(int(sys.argv[1])), float(sys.argv[2])
+chance, longest = random.Random({seed}), {longest_nap}
 
 def slowed(take):
     def take_slowly(self, message):
@@ -40,25 +37,25 @@ def slowed(take):
 
 GoalController.hear, GoalController.see = slowed(GoalController.hear), slowed(GoalController.see)
 print("imported", flush=True)
-sys.exit(main(sys.argv[2:]))
 """
 """The controller with a nap before each message that it takes, so that clock and frame change places."""
 
 
-@contextmanager
-def goal_controller(domain, channel="swelling", seed=1, longest_nap=0.0, name="goal_controller"):
-    """A process that begins with its node; it ends with the block."""
-    parameters = [part for key, value in {"channel": channel, **BEAT}.items() for part in ("-p", f"{key}:={value}")]
-    command = [sys.executable, "-c", SLOWED, str(seed), str(longest_nap), "--ros-args", "-r", f"__node:={name}"]
-    with subprocess.Popen(
-        [*command, *parameters], env=os.environ | {"ROS_DOMAIN_ID": str(domain)}, stdout=subprocess.PIPE, text=True
-    ) as process:
-        try:
-            assert process.stdout.readline() == "imported\n"
-            yield process
-        finally:
-            process.send_signal(signal.SIGINT)
-            assert process.wait(30) == 0
+@pytest.fixture
+def goal_controller(start, domain):
+    """Starts a controller that takes naps, in a process that begins with its node; it ends with a block."""
+
+    @contextmanager
+    def begin(channel="swelling", seed=1, longest_nap=0.0, name="goal_controller"):
+        program = SLOWED.format(seed=seed, longest_nap=longest_nap)
+        renamed = ["--ros-args", "-r", f"__node:={name}"]
+        controller = start("controllers.goal_controller", domain, {"channel": channel, **BEAT}, renamed, program)
+        controller.wait_for("imported")
+        yield
+        controller.send(signal.SIGINT)
+        assert controller.wait(30) == 0
+
+    return begin
 
 
 def states(log):
@@ -72,18 +69,18 @@ def before(time, messages):
     return [message for message in messages if message[1] < 1e9 * time]
 
 
-def run(start, domain, log, lateness, seed, longest_nap):
+def run(start, goal_controller, domain, log, lateness, seed, longest_nap):
     """Run a node to its end; the controller begins so long after the node waits for it [s], or before the node."""
     simulation = LOCKSTEP | {"scene": "bending", "log": log, "duration": 0.4}
     if lateness is None:
-        with goal_controller(domain, seed=seed, longest_nap=longest_nap):
+        with goal_controller(seed=seed, longest_nap=longest_nap):
             node = start("sim_node", domain, simulation)
             assert node.wait() == 0, node.output
         return
     node = start("sim_node", domain, simulation)
     node.wait_for("is ready")
     time.sleep(lateness)
-    with goal_controller(domain, seed=seed, longest_nap=longest_nap):
+    with goal_controller(seed=seed, longest_nap=longest_nap):
         assert node.wait() == 0, node.output
 
 
@@ -155,13 +152,17 @@ def test_while_a_tick_waits_its_frame_is_repeated_with_it(monkeypatch):
     assert heard[:8] == [("frame", 0.0), ("tick", 0.0)] * 4
 
 
-@pytest.mark.slow
+CASES = [(lateness, nap) for lateness in (None, 0.0, 0.5, 2.0) for nap in (0.0, 0.05)] + [(None, 0.1), (1.0, 0.1)]
+
+
 @pytest.mark.timeout(1200)
-def test_ten_runs_whose_controllers_start_late_and_are_slow_are_equal(start, domain, tmp_path):
-    cases = [(lateness, nap) for lateness in (None, 0.0, 0.5, 2.0) for nap in (0.0, 0.05)] + [(None, 0.1), (1.0, 0.1)]
+@pytest.mark.parametrize(
+    "cases", [[(None, 0.0), (0.5, 0.05)], pytest.param(CASES, marks=pytest.mark.verify)], ids=["two", "all"]
+)
+def test_runs_whose_controllers_start_late_and_are_slow_are_equal(start, goal_controller, domain, tmp_path, cases):
     logs = [tmp_path / f"{seed}.mcap" for seed in range(len(cases))]
     for seed, ((lateness, nap), log) in enumerate(zip(cases, logs, strict=True)):
-        run(start, domain, log, lateness, seed, nap)
+        run(start, goal_controller, domain, log, lateness, seed, nap)
     first = states(logs[0])
     assert len(stimuli_taken(logs[0])) == 20
     peaks = {value for _, value in stimuli_taken(logs[0]) if value > 0.05}
@@ -170,12 +171,14 @@ def test_ten_runs_whose_controllers_start_late_and_are_slow_are_equal(start, dom
         assert states(log) == first
 
 
-def test_two_feedback_controllers_make_the_same_run_after_a_reset_and_with_a_pause(start, connect, domain, tmp_path):
+def test_two_feedback_controllers_make_the_same_run_after_a_reset_and_with_a_pause(
+    start, connect, goal_controller, domain, tmp_path
+):
     scene = tmp_path / "two.yaml"
     scene.write_text(TWO_CHANNELS)
     parameters = LOCKSTEP | {"scene": scene, "lockstep_answers": "[heat, light]"}
     logs = [tmp_path / "straight.mcap", tmp_path / "again.mcap"]
-    with goal_controller(domain, "heat", name="of_heat"), goal_controller(domain, "light", 2, 0.02, "of_light"):
+    with goal_controller("heat", name="of_heat"), goal_controller("light", 2, 0.02, "of_light"):
         node = start("sim_node", domain, parameters | {"log": logs[0], "duration": 0.4})
         assert node.wait() == 0, node.output
         node = start("sim_node", domain, parameters | {"log": logs[1], "start_paused": True})

@@ -28,6 +28,7 @@ def prefix(root, tmp_path_factory):
 EXECUTABLES = ["sim_node", "replay_node", "ramp_controller", "gait_controller", "goal_controller"]
 
 
+@pytest.mark.verify
 def test_ros2_finds_executables_and_launch_files_after_an_editable_installation(root, tmp_path):
     shutil.copytree(root, tmp_path / "sources", ignore=NOT_SOURCES)
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--ignore-installed"]
@@ -41,6 +42,7 @@ def test_ros2_finds_executables_and_launch_files_after_an_editable_installation(
     assert launch_files == {"simulation.launch.py", "replay.launch.py"}
 
 
+@pytest.mark.verify
 @pytest.mark.parametrize("kind", ["install", "develop"])
 def test_colcon_puts_the_command_on_the_path_and_executables_where_ros2_run_looks(root, tmp_path, kind):
     """colcon calls setup.py itself, and makes links to data files where it is asked for links."""
@@ -101,11 +103,21 @@ def test_an_installation_has_its_licence_and_those_of_compiled_kernels(prefix):
     assert {"LICENSE", "NOTICE"} <= {path.name for path in information.rglob("*")}
 
 
-@pytest.mark.parametrize("name", EXECUTABLES)
-def test_executables_are_where_ros2_run_looks_for_them(prefix, run, name):
-    shown = run(prefix / "lib/bilayer_sim_ros" / name, "--help")
+RUN_ALL = """
+import contextlib, runpy, sys
+sys.argv = [None, "--help"]
+for sys.argv[0] in {paths}:
+    with contextlib.suppress(SystemExit):
+        runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+
+
+def test_executables_are_where_ros2_run_looks_for_them(prefix, run):
+    paths = [str(prefix / "lib/bilayer_sim_ros" / name) for name in EXECUTABLES]
+    assert all(os.access(path, os.X_OK) for path in paths)
+    shown = run(sys.executable, "-c", RUN_ALL.format(paths=paths))
     assert shown.returncode == 0, shown.stderr
-    assert f"usage: {name}" in shown.stdout
+    assert re.findall(r"^usage: (\w+)", shown.stdout, re.M) == EXECUTABLES
 
 
 def test_the_core_needs_nothing_of_ros(run):

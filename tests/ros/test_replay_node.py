@@ -18,6 +18,7 @@ from support import synthetic_run
 from support.processes import bilayer, command, environment
 from support.written_logs import LATCHED, number, value_of, write_log
 
+from bilayer_core.cli import main
 from bilayer_core.log.file.indexed_log import IndexedLog
 from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_core.log.run.log_reader import read_messages
@@ -269,16 +270,16 @@ def test_the_command_plays_a_log_and_tells_that_it_cannot_keep_up(counted_log, d
         (["--force"], "--force: is not for --ros"),
     ],
 )
-def test_options_that_the_command_cannot_heed_are_refused(counted_log, arguments, said):
-    done = bilayer("replay", counted_log(), "--ros", *arguments)
-    assert done.returncode == 2 and said in done.stderr
-    assert "Traceback" not in done.stderr
+def test_options_that_the_command_cannot_heed_are_refused(counted_log, arguments, said, capsys):
+    assert main(["replay", str(counted_log()), "--ros", *arguments]) == 2
+    assert said in capsys.readouterr().err
 
 
-def test_rate_and_loop_without_ros_are_refused(counted_log):
+def test_rate_and_loop_without_ros_are_refused(counted_log, capsys):
+    log = str(counted_log())
     for option in (["--loop"], ["--rate", "2"]):
-        done = bilayer("replay", counted_log(), "--verify", *option)
-        assert done.returncode == 2 and f"{option[0]}: is for --ros" in done.stderr
+        assert main(["replay", log, "--verify", *option]) == 2
+        assert f"{option[0]}: is for --ros" in capsys.readouterr().err
 
 
 def test_where_ros_is_missing_the_command_says_so_with_exit_code_2(counted_log, tmp_path):
@@ -293,17 +294,16 @@ def test_where_ros_is_missing_the_command_says_so_with_exit_code_2(counted_log, 
     assert "pip install 'bilayer_sim_ros[ros]'" in done.stderr and "Traceback" not in done.stderr
 
 
-def test_a_log_that_was_cut_off_is_refused_with_what_repairs_it_and_then_plays(run_log, domain, monkeypatch, tmp_path):
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
+def test_a_log_that_was_cut_off_is_refused_with_what_repairs_it_and_then_plays(run_log, start, domain, tmp_path):
     cut, new = tmp_path / "cut.mcap", tmp_path / "NEW.mcap"
     cut.write_bytes(run_log.read_bytes()[:-100])
-    done = bilayer("replay", cut, "--ros")
-    assert done.returncode == 2
-    assert f"{cut}: has no index" in done.stderr and "Traceback" not in done.stderr
-    (repair,) = re.findall(r"bilayer (repair \S+) NEW\.mcap", done.stderr)
-    assert bilayer(*repair.split(), new).returncode == 0
-    played = bilayer("replay", new, "--ros", "--rate", "10")
-    assert played.returncode == 0 and "ended at t = 0.5 s" in played.stderr, played.stderr
+    refused = start("replay_node", domain, arguments=[cut])
+    assert refused.wait() == 2
+    assert f"{cut}: has no index" in refused.output and "Traceback" not in refused.output
+    (repair,) = re.findall(r"bilayer (repair \S+) NEW\.mcap", refused.output)
+    assert main([*repair.split(), str(new)]) == 0
+    played = start("replay_node", domain, {"play.rate": 10.0}, [new])
+    assert played.wait() == 0 and "ended at t = 0.5 s" in played.output, played.output
 
 
 @pytest.mark.parametrize(

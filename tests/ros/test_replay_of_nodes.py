@@ -1,6 +1,5 @@
 """Logs of real nodes, whose runs are made again bit for bit."""
 
-import json
 import random
 import time
 
@@ -10,12 +9,12 @@ from geometry_msgs.msg import PoseStamped
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
 from support.acted_scenes import pushed
-from support.processes import bilayer
 
 from bilayer_core.log.messages.encoders import decode_input
 from bilayer_core.log.messages.topics import INPUTS
 from bilayer_core.log.run.log_reader import read_messages
 from bilayer_core.observed.inputs import LOAD, POSE, RESET, STIMULUS, UNTIL
+from bilayer_core.runs.replay import verify
 
 NAMESPACE = "/bilayer_sim"
 
@@ -38,10 +37,8 @@ def kinds(log):
 
 
 def assert_it_comes_out(log):
-    done = bilayer("replay", log, "--verify", "--json", "-")
-    assert done.returncode == 0, done.stdout + done.stderr
-    found = json.loads(done.stdout)
-    assert found["pass"] and found["states"] > 5 and not found["changed"]
+    found = verify(log)
+    assert found.passed and found.states > 5 and not found.changed
     return found
 
 
@@ -82,7 +79,7 @@ def test_a_node_in_lockstep(start, connect, domain, tmp_path, scene):
     client.spin_to_the_end()
     assert node.wait() == 0, node.output
     assert kinds(log)[UNTIL] >= 13
-    assert assert_it_comes_out(log)["inputs"] >= 13
+    assert assert_it_comes_out(log).inputs >= 13
 
 
 def test_runs_before_and_after_a_reset(start, connect, domain, tmp_path, scene):

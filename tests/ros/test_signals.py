@@ -13,7 +13,7 @@ LIMIT = 120.0
 HEAD = """
 import os, signal, sys, time
 from bilayer_sim_ros import sim_node
-NUMBERS = [getattr(signal, name) for name in sys.argv.pop(1).split(",")]
+NUMBERS = [getattr(signal, name) for name in SIGNALS.split(",")]
 
 def send(number_of_times=1):
     for number in NUMBERS * number_of_times:
@@ -109,7 +109,6 @@ import atexit, os, signal, sys, threading, time
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from bilayer_sim_ros.controllers import {name}
 
 def send():
     for number in [signal.SIGINT, signal.SIGTERM] * 2:
@@ -128,7 +127,6 @@ def send_in(owner, name):
     setattr(owner, name, call_and_send)
 
 {moment}
-sys.exit({name}.main())
 """
 MOMENTS = {
     "rclpy is initialised": "send_in(rclpy, 'init')",
@@ -150,29 +148,36 @@ def compiled():
 
 
 @pytest.fixture
-def ended(tmp_path, domain):
+def ended(tmp_path, domain, start):
     """Runs a node that signals reach at some moment; its exit code and what it printed."""
 
-    def run(program, signals):
-        arguments = [signals, "--ros-args", "-p", "scene:=bending", "-p", "log:=run.mcap"]
-        finished = subprocess.run(
-            [sys.executable, "-c", HEAD + program + TAIL, *arguments],
-            cwd=tmp_path,
-            env=os.environ | {"ROS_DOMAIN_ID": str(domain)},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            timeout=LIMIT,
-        )
-        assert "Traceback" not in finished.stdout
-        return finished.returncode, finished.stdout
+    def run(program, signals, imports=False):
+        """`imports`: the process begins as one of its own does, and ends so."""
+        program = f"SIGNALS = {signals!r}\n{HEAD}{program}"
+        arguments = ["--ros-args", "-p", "scene:=bending", "-p", f"log:={tmp_path}/run.mcap"]
+        if not imports:
+            node = start("sim_node", domain, arguments=arguments, program=program)
+            code, output = node.wait(), node.output
+        else:
+            finished = subprocess.run(
+                [sys.executable, "-c", program + TAIL, *arguments],
+                cwd=tmp_path,
+                env=os.environ | {"ROS_DOMAIN_ID": str(domain)},
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                text=True,
+                timeout=LIMIT,
+            )
+            code, output = finished.returncode, finished.stdout
+        assert "Traceback" not in output
+        return code, output
 
     return run
 
 
 @pytest.mark.parametrize("signals", ["SIGINT", "SIGTERM", "SIGINT,SIGINT"])
 def test_a_signal_while_modules_are_imported_ends_it_with_0_and_a_line(ended, signals):
-    code, output = ended(WHILE_IMPORTING, signals)
+    code, output = ended(WHILE_IMPORTING, signals, imports=True)
     assert (code, output) == (0, f"sim_node: ended by {signals.partition(',')[0]}, before there was a node\n")
 
 
@@ -184,11 +189,9 @@ def test_signals_while_kernels_are_compiled_end_it_at_once_and_the_log_says_so(e
     assert (info.complete, info.termination) == (False, reason)
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("compiled")
-@pytest.mark.parametrize("program", [WHILE_CLOSING, WHILE_LEAVING], ids=["closing", "leaving"])
-def test_signals_while_the_log_is_closed_and_the_process_ends_change_nothing(ended, tmp_path, program):
-    code, output = ended(WHILE_STEPPING + program, "SIGINT,SIGTERM")
+def test_signals_while_the_log_is_closed_and_the_process_ends_change_nothing(ended, tmp_path):
+    code, output = ended(WHILE_STEPPING + WHILE_CLOSING + WHILE_LEAVING, "SIGINT,SIGTERM", imports=True)
     assert code == 0, output
     info = read_info(tmp_path / "run.mcap")
     assert (info.complete, info.termination) == (False, "ended by SIGINT")
@@ -202,10 +205,9 @@ def test_a_signal_that_the_system_hands_to_another_thread_ends_the_node(ended, t
 
 
 def test_signals_may_interrupt_the_handlers_of_others_and_the_wait_for_them(ended):
-    assert ended(WHILE_SIGNALS_ARE_HANDLED, "SIGINT,SIGTERM") == (0, "")
+    assert ended(WHILE_SIGNALS_ARE_HANDLED, "SIGINT,SIGTERM", imports=True) == (0, "")
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("compiled")
 def test_a_node_ends_without_a_word_of_an_executor_that_was_about_to_wait(ended):
     code, output = ended(ABOUT_TO_WAIT, "SIGTERM")
@@ -213,29 +215,8 @@ def test_a_node_ends_without_a_word_of_an_executor_that_was_about_to_wait(ended)
 
 
 @pytest.mark.parametrize("moment", MOMENTS.values(), ids=MOMENTS)
-def test_signals_end_controllers_with_0_and_no_traceback_when(domain, tmp_path, moment):
-    running = {
-        name: subprocess.Popen(
-            [
-                sys.executable,
-                "-c",
-                CONTROLLER.format(name=name, moment=moment),
-                "--ros-args",
-                "-p",
-                "use_sim_time:=true",
-            ],
-            cwd=tmp_path,
-            env=os.environ | {"ROS_DOMAIN_ID": str(domain)},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-        for name in CONTROLLERS
-    }
-    for name, process in running.items():
-        with process:
-            try:
-                output, _ = process.communicate(timeout=LIMIT)
-            finally:
-                process.kill()
-        assert process.returncode == 0 and "Traceback" not in output, (name, process.returncode, output)
+def test_signals_end_controllers_with_0_and_no_traceback_when(start, domain, moment):
+    program = CONTROLLER.format(moment=moment)
+    running = [start(f"controllers.{name}", domain, {"use_sim_time": True}, program=program) for name in CONTROLLERS]
+    for controller in running:
+        assert controller.wait() == 0 and "Traceback" not in controller.output, controller.output

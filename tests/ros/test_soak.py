@@ -49,7 +49,7 @@ class Beside:
         return json.loads(self._process.communicate(timeout=30)[0].splitlines()[-1])
 
 
-@pytest.mark.slow
+@pytest.mark.verify
 @pytest.mark.timeout(3600)
 def test_nonsense_at_1_khz_and_fifty_restless_subscribers_leave_the_memory_flat(start, domain, tmp_path):
     scene, log = tmp_path / "pushed.yaml", tmp_path / "run.mcap"

@@ -3,7 +3,24 @@
 import numpy as np
 import pytest
 
-from bilayer_core.engine.linear.dense import count_negative_dense
+from bilayer_core.engine.linear import dense
+from bilayer_core.jit import piece, record
+from bilayer_core.jit.record import Matrix
+
+
+@record
+class Square:
+    matrix: Matrix
+
+
+@piece(int, Square, int)
+def count_for_a_test(square, n):
+    return dense.count_negative_dense(square.matrix, n)
+
+
+def count_negative_dense(matrix, n):
+    """The count by compiled code, which is kept for the next run of this test."""
+    return count_for_a_test(Square(matrix=matrix), n)
 
 
 @pytest.mark.parametrize("seed", range(5))

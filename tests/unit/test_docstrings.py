@@ -9,6 +9,7 @@ from dataclasses import is_dataclass
 from pathlib import Path
 
 from numpydoc.validate import validate
+from support.sources import nodes_of
 
 import bilayer_core
 from bilayer_core.log.file.mcap_log import McapRecorder
@@ -32,7 +33,7 @@ CODES = {"PR01", "PR02", "PR03", "RT01", "YD01"}
 def test_no_docstring_begins_with_half_a_sentence():
     wrong = []
     for path in SOURCES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in nodes_of(path):
             text = ast.get_docstring(node) if isinstance(node, DOCUMENTED) else None
             if text and text.split()[0] in REFUSED:
                 wrong.append(f"{path.relative_to(ROOT)}: {text.splitlines()[0]}")

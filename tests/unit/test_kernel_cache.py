@@ -14,48 +14,54 @@ from bilayer_core.errors import OutputError
 from bilayer_core.jit import cache, compile_all, digest, piece
 
 PROGRAM = """
-import math
+import numpy as np
 
-from bilayer_core import load_scene
-from bilayer_core.engine.engine import error_norm_of
-from bilayer_core.engine.error_norm import step_defect
-from bilayer_core.model.build_model import build_model
-from bilayer_core.model.records.step import StateArrays
-from bilayer_core.model.state import initial_state
+from bilayer_core.jit import piece, record
+from bilayer_core.jit.record import Stack
+from bilayer_core.kinematics.rotating import rotate_by, rotation_vector_between
 
-model = build_model(load_scene("gripping"), "laminate", 3)
-before, after = initial_state(model), initial_state(model)
-ball = model.free_bodies.body_of_free[0]
-turn = [[math.cos(0.1), -math.sin(0.1), 0], [math.sin(0.1), math.cos(0.1), 0], [0, 0, 1]]
-after.body_rotation[ball] = turn @ after.body_rotation[ball]
-ends = (StateArrays(**{name: getattr(state, name) for name in StateArrays.names}) for state in (before, after))
-print(repr(step_defect(error_norm_of(model), *ends, 0.0)))
+@record
+class Pair:
+    rotations: Stack
+
+@piece(float, Pair)
+def turned(pair):
+    return rotation_vector_between(pair.rotations, 0, pair.rotations, 1)[2]
+
+@piece(float, Pair)
+def turn(pair):
+    rotate_by(0.0, 0.0, 0.1, pair.rotations, 0, pair.rotations, 1)
+    return 0.0
+
+pair = Pair(rotations=np.array([np.eye(3), np.eye(3)]))
+turn(pair)
+print(repr(turned(pair)))
 """
 CALLED, TURN = "bilayer_core/kinematics/rotating.py", "return factor * x, factor * y, factor * z"
 TRIPLED = "return 3.0 * factor * x, 3.0 * factor * y, 3.0 * factor * z"
 """A file of functions that kernels call, and what one of them says of the turn of a body."""
 
 
-def _defect(tree, folder):
+def _turn(tree, folder):
     environment = os.environ | {"PYTHONPATH": str(tree), "NUMBA_CACHE_DIR": str(folder), "BILAYER_JIT_AHEAD": "0"}
-    run = subprocess.run([sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, cwd=tree)
+    (tree / "program.py").write_text(PROGRAM)
+    run = subprocess.run([sys.executable, "program.py"], env=environment, capture_output=True, text=True, cwd=tree)
     assert run.returncode == 0, run.stderr
     return float(run.stdout)
 
 
 def test_an_edit_of_a_function_that_kernels_call_changes_the_result_at_once(root, tmp_path):
     tree, folder = tmp_path / "tree", tmp_path / "cache"
-    for part in ("bilayer_core", "config"):
-        shutil.copytree(root / part, tree / part, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(root / "bilayer_core", tree / "bilayer_core", ignore=shutil.ignore_patterns("__pycache__"))
     path = tree / CALLED
     source = path.read_text(encoding="utf-8")
     assert source.count(TURN) == 1
-    first = _defect(tree, folder)
-    assert _defect(tree, folder) == first > 0.0
+    first = _turn(tree, folder)
+    assert _turn(tree, folder) == first == pytest.approx(0.1)
     path.write_text(source.replace(TURN, TRIPLED), encoding="utf-8")
-    assert _defect(tree, folder) == pytest.approx(3.0 * first, rel=1e-12)
+    assert _turn(tree, folder) == pytest.approx(3.0 * first, rel=1e-12)
     compiled = Counter(path.name.rpartition("-")[0] for path in (folder / "kernels").iterdir())
-    assert compiled == {"step_defect": 2, "near_pairs": 1}  # the edit changes one of the pieces that were needed
+    assert compiled == {"turned": 2, "turn": 1}  # the edit changes one of the pieces
 
 
 @pytest.fixture

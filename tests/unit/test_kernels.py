@@ -43,8 +43,9 @@ def _printed_by(program):
 
 
 def test_a_warm_run_compiles_nothing_and_loads_only_the_pieces_it_needs():
-    _printed_by(PROGRAM)  # compiles what is not in the cache
     compiled, loaded = _printed_by(PROGRAM)
+    if compiled:  # what was not in the cache
+        compiled, loaded = _printed_by(PROGRAM)
     assert not compiled
     assert "assemble_in_space" in loaded and "make_step" in loaded
     assert not {"assemble_in_plane", "add_elasticity_in_plane", "adapt", "factor_5"} & set(loaded)
