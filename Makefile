@@ -30,7 +30,6 @@ demo: $(STAMP)  ## Run the gripper: simulation node, controller, log, picture.
 	$(BIN)/python -m bilayer_sim_ros.demo
 
 test: $(TESTS)  ## Run the tests, the slow ones as well.
-	command -v chromium >/dev/null || $(BIN)/playwright install --with-deps chromium
 	$(BIN)/python -m pytest -m "not verify" -n $(JOBS) --dist worksteal
 
 lint: $(TESTS)  ## Check the code's style, and the types of what programs call.
@@ -48,6 +47,7 @@ stress: $(TESTS)  ## Run a hundred stress cases, about three minutes.
 
 # What is found is committed: docs/stability.md with its figures, and the notes in docs/data that it shows.
 verify: bounds  ## Run what takes hours: long tests, bounds, all stress cases, 10,000 mutated scenes, 2,000 logs, 250 kills, a soak, films, seeded bugs.
+	command -v chromium >/dev/null || $(BIN)/playwright install --with-deps chromium
 	$(BIN)/python -m pytest -m verify -n $(JOBS) --dist worksteal
 	FUZZ_SCENES=10000 FUZZ_SEED=7 $(BIN)/python -m pytest -m "" -n $(JOBS) tests/fuzz/test_mutated_scenes.py
 	FUZZ_LOGS=2000 FUZZ_STATES=1000 FUZZ_SEED=7 $(BIN)/python -m pytest -m "" -s tests/fuzz/test_mutated_logs.py
@@ -113,7 +113,7 @@ system:
 	PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p | grep -q libEGL.so.1 && \
 	    PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p | grep -q libEGL_ || \
 	    missing="$$missing libegl1 libegl-mesa0 libgl1-mesa-dri"; \
-	$(if $(filter test,$(MAKECMDGOALS)),! grep -qx ID=debian /etc/os-release || command -v chromium >/dev/null || missing="$$missing chromium";) \
+	$(if $(filter verify,$(MAKECMDGOALS)),! grep -qx ID=debian /etc/os-release || command -v chromium >/dev/null || missing="$$missing chromium";) \
 	test -n "$$missing" || exit 0; \
 	if test "$$(id -u)" = 0; then sudo=; elif sudo -n true 2>/dev/null; then sudo=sudo; else sudo=no; fi; \
 	if test "$$sudo" != no && command -v apt-get >/dev/null; then \

@@ -134,7 +134,7 @@ def test_stress_cases_judge_what_tests_let_live_and_the_source_is_restored(
     assert (path.read_bytes(), path.stat().st_mtime_ns) == before and not any((tmp_path / "kernels").iterdir())
 
 
-@pytest.mark.slow
+@pytest.mark.verify
 @pytest.mark.timeout(4 * LONGEST)
 @pytest.mark.parametrize("name", CHOSEN)
 def test_a_bug_is_noticed(name, tree):

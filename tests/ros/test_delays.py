@@ -125,7 +125,7 @@ def test_a_node_that_is_behind_says_so_and_then_every_ten_seconds(start, domain)
     node.wait_for("behind: simulated time goes at")
     said = re.search(r"asked for is 1e\+06; .* Cause: (.*), \d+% of the time", node.output)
     assert said and said[1] in ("physics", "other threads and programs")
-    time.sleep(2.5)
+    time.sleep(1.5)
     node.send(signal.SIGINT)
     assert node.wait() == 0
     stamps = [float(stamp) for stamp in re.findall(r"\[(\d+\.\d+)\].*behind:", node.output)]

@@ -10,19 +10,7 @@ import sys
 import pytest
 
 pytestmark = pytest.mark.slow
-
-
 NOT_SOURCES = shutil.ignore_patterns(".*", "__pycache__", "build", "runs", "*.egg-info")
-
-
-@pytest.fixture(scope="module")
-def prefix(root, tmp_path_factory):
-    """Where a plain installation went, without its dependencies, which are those of the environment."""
-    directory = tmp_path_factory.mktemp("installation")
-    shutil.copytree(root, directory / "sources", ignore=NOT_SOURCES)
-    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--ignore-installed"]
-    subprocess.run([*pip, "--prefix", directory / "prefix", directory / "sources"], check=True)
-    return directory / "prefix"
 
 
 EXECUTABLES = ["sim_node", "replay_node", "ramp_controller", "gait_controller", "goal_controller"]
@@ -71,61 +59,51 @@ def test_colcon_puts_the_command_on_the_path_and_executables_where_ros2_run_look
     assert shown.returncode == 0 and "gripping" in shown.stdout, shown.stderr
 
 
-@pytest.fixture
-def run(prefix, tmp_path):
-    """Runs a command with the installation before everything else, away from the checkout."""
-    (packages,) = prefix.glob("lib/python3*/site-packages")
-    environment = os.environ | {"PYTHONPATH": str(packages)}
-
-    def finished(*command):
-        return subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=120)
-
-    return finished
-
-
-def test_the_bundled_scenes_are_found(prefix, run):
-    listing = run(sys.executable, "-m", "bilayer_core", "scenes")
-    assert listing.returncode == 0, listing.stderr
-    assert "gripping" in listing.stdout
-    assert str(prefix) in run(sys.executable, "-c", "import bilayer_core; print(bilayer_core.__file__)").stdout
-
-
-def test_package_index_and_files_are_where_ros_looks_for_them(prefix):
-    assert (prefix / "share/ament_index/resource_index/packages/bilayer_sim_ros").is_file()
-    configuration = ("config/sim_node.yaml", "config/scenes/gripping.yaml", "config/templates/strip.yaml")
-    configuration += ("config/sweeps/walker_gait.yaml", "config/sweeps/walker_gait.py")
-    for name in ("package.xml", *configuration, "launch/simulation.launch.py", "launch/replay.launch.py"):
-        assert (prefix / "share/bilayer_sim_ros" / name).is_file()
-
-
-def test_an_installation_has_its_licence_and_those_of_compiled_kernels(prefix):
-    (information,) = prefix.glob("lib/python3*/site-packages/bilayer_sim_ros-*.dist-info")
-    assert {"LICENSE", "NOTICE"} <= {path.name for path in information.rglob("*")}
-
-
-RUN_ALL = """
+SHOW_HELP = """
 import contextlib, runpy, sys
 sys.argv = [None, "--help"]
 for sys.argv[0] in {paths}:
     with contextlib.suppress(SystemExit):
         runpy.run_path(sys.argv[0], run_name="__main__")
 """
+WITHOUT_ROS = "import sys; sys.modules['rclpy'] = None\nfrom bilayer_sim_ros.sim_node import main\nsys.exit(main())"
 
 
-def test_executables_are_where_ros2_run_looks_for_them(prefix, run):
-    paths = [str(prefix / "lib/bilayer_sim_ros" / name) for name in EXECUTABLES]
-    assert all(os.access(path, os.X_OK) for path in paths)
-    shown = run(sys.executable, "-c", RUN_ALL.format(paths=paths))
-    assert shown.returncode == 0, shown.stderr
-    assert re.findall(r"^usage: (\w+)", shown.stdout, re.M) == EXECUTABLES
+def test_an_installation_has_commands_scenes_licences_and_what_ros_looks_for(root, tmp_path):
+    """Installed once, without its dependencies, which are those of the environment, and used away from the checkout."""
+    shutil.copytree(root, tmp_path / "sources", ignore=NOT_SOURCES)
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--ignore-installed", "--no-compile"]
+    subprocess.run([*pip, "--prefix", tmp_path / "prefix", tmp_path / "sources"], check=True)
+    prefix = tmp_path / "prefix"
+    (packages,) = prefix.glob("lib/python3*/site-packages")
 
+    def run(*command):
+        environment = os.environ | {"PYTHONPATH": str(packages)}
+        return subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=120)
 
-def test_the_core_needs_nothing_of_ros(run):
-    program = "import sys; sys.modules['rclpy'] = None\nfrom bilayer_sim_ros.sim_node import main\nsys.exit(main())"
-    node = run(sys.executable, "-c", program)
-    assert node.returncode == 2
+    assert (prefix / "share/ament_index/resource_index/packages/bilayer_sim_ros").is_file()
+    configuration = ("config/sim_node.yaml", "config/scenes/gripping.yaml", "config/templates/strip.yaml")
+    configuration += ("config/sweeps/walker_gait.yaml", "config/sweeps/walker_gait.py")
+    for name in ("package.xml", *configuration, "launch/simulation.launch.py", "launch/replay.launch.py"):
+        assert (prefix / "share/bilayer_sim_ros" / name).is_file()
+
+    (information,) = packages.glob("bilayer_sim_ros-*.dist-info")
+    assert {"LICENSE", "NOTICE"} <= {path.name for path in information.rglob("*")}
+
+    listing = run(prefix / "bin" / "bilayer", "scenes")
+    assert listing.returncode == 0 and "gripping" in listing.stdout, listing.stderr
+    assert str(prefix) in run(sys.executable, "-c", "import bilayer_core; print(bilayer_core.__file__)").stdout
+
+    for name in EXECUTABLES:  # they run those of the same name in bin
+        assert os.access(prefix / "lib/bilayer_sim_ros" / name, os.X_OK)
+    shown = run(prefix / "lib/bilayer_sim_ros/gait_controller", "--help")
+    assert shown.returncode == 0 and "usage: gait_controller" in shown.stdout, shown.stderr
+    shown = run(sys.executable, "-c", SHOW_HELP.format(paths=[str(prefix / "bin" / name) for name in EXECUTABLES]))
+    assert re.findall(r"^usage: (\w+)", shown.stdout, re.M) == EXECUTABLES, shown.stderr
+
+    node = run(sys.executable, "-c", WITHOUT_ROS)
+    assert node.returncode == 2 and "Traceback" not in node.stderr
     assert "pip install 'bilayer_sim_ros[ros]'" in node.stderr
-    assert "Traceback" not in node.stderr
 
 
 def test_every_ros_wheel_of_this_environment_is_pinned(root):

@@ -89,7 +89,7 @@ def log(domain_of_module, start, tmp_path_factory):
     simulation = start(
         "sim_node",
         domain_of_module,
-        {"scene": "bending", "log": path, "start_paused": True, "duration": 1.5 * DURATION},
+        {"scene": "bending", "log": path, "start_paused": True, "duration": 1.5 * DURATION, "real_time_factor": 0.5},
     )
     controller = start(
         "controllers.ramp_controller",
@@ -164,9 +164,9 @@ def subscriber(domain):
 
 
 def test_without_a_clock_the_controller_does_not_take_real_time_for_simulated(start, domain, subscriber):
-    controller = start("controllers.ramp_controller", domain, {"connection_timeout": 8.0, "use_sim_time": True})
+    controller = start("controllers.ramp_controller", domain, {"connection_timeout": 4.0, "use_sim_time": True})
     assert controller.wait() == 2
-    assert "/clock is silent, and simulated_time is true (waited 8 s)" in controller.output
+    assert "/clock is silent, and simulated_time is true (waited 4 s)" in controller.output
     assert not subscriber
 
 

@@ -23,6 +23,7 @@ from bilayer_core.view.recording_layout import CHANNEL_COLOURS
 from bilayer_core.view.rerun_view import write_branches
 from bilayer_core.view.theme import BACKGROUND, BALL_COLOURS
 
+pytestmark = pytest.mark.verify
 SIZE = {"width": 1280, "height": 800}
 LIMIT = 120.0
 """Longest wait for an address, and for a finished picture [s]."""
@@ -119,7 +120,6 @@ def has_ball(picture):
     return len(rows) > 1000 and np.ptp(rows) > 0.1 and 0.2 < np.median(columns) < 0.42
 
 
-@pytest.mark.slow
 def test_a_log_in_the_browser_has_its_layout_and_a_title_fetches_nothing(log, browser):
     with shown(log.parent, "--web", "run.mcap") as viewing:
         picture, hosts = look(
@@ -130,7 +130,6 @@ def test_a_log_in_the_browser_has_its_layout_and_a_title_fetches_nothing(log, br
     assert "127.0.0.1" in hosts and "stranger.invalid" not in hosts
 
 
-@pytest.mark.slow
 def test_branches_in_the_browser_have_their_layout(log, browser, tmp_path):
     run = read_log(log)
     branches = [SimpleNamespace(value=0.1, run=run, stopped="")]
@@ -140,7 +139,6 @@ def test_branches_in_the_browser_have_their_layout(log, browser, tmp_path):
     assert has_robot(picture) and has_plots(picture, FIRST)
 
 
-@pytest.mark.slow
 def test_a_run_that_goes_on_has_its_layout_in_the_browser(log, browser):
     with shown(log.parent, "--follow", "--serve", "run.mcap") as viewing:
         picture, _ = look(browser, viewing.address, log.parent, lambda p: has_robot(p) and has_plots(p))

@@ -17,6 +17,7 @@ import pytest
 from PIL import Image
 from support import processes, recordings, synthetic_run
 
+from bilayer_core.cli import main
 from bilayer_core.errors import InputError
 from bilayer_core.log.file.growing_log import GrowingLog
 from bilayer_core.log.file.mcap_log import McapRecorder
@@ -182,7 +183,8 @@ def test_an_address_that_is_not_of_this_machine_is_refused():
         ViewServer(bind="nowhere.invalid")
 
 
-def test_what_cannot_be_followed_is_refused_in_one_line(tmp_path):
+def test_what_cannot_be_followed_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "empty.mcap").write_bytes(b"")
     for arguments, said in [
         (["none.mcap"], "none.mcap: cannot be read: No such file"),
@@ -191,9 +193,9 @@ def test_what_cannot_be_followed_is_refused_in_one_line(tmp_path):
         (["run.mcap", "--node", "/other"], "--node: is followed without a log"),
         (["run.mcap", "--screenshot", "a.png"], "--screenshot: is of a run that is over"),
     ]:
-        with following(tmp_path, *arguments) as follower:
-            assert follower.process.wait(LIMIT) == 2, follower.said
-            assert said in follower.said and follower.said.count("\n") == 1
+        assert main(["view", "--follow", "--serve", *arguments]) == 2
+        told = capsys.readouterr().err
+        assert said in told and told.count("\n") == 1
 
 
 def test_parts_of_a_frame_come_back_and_a_frame_that_lacks_some_is_refused():

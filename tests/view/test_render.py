@@ -100,8 +100,10 @@ def test_what_cannot_be_drawn_is_refused_before_anything_is(arguments, message, 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["there.png"]
 
 
-@pytest.mark.parametrize("camera", ["auto", "follow", "iso", "front", "side", "top", "30,50", "-120 deg, 0.3 rad"])
-@pytest.mark.parametrize("time", [0.0, 4.0])
+CAMERAS = ("auto", "follow", "iso", "front", "side", "top", "30,50", "-120 deg, 0.3 rad")
+
+
+@pytest.mark.parametrize(("camera", "time"), [*((camera, 4.0) for camera in CAMERAS), ("auto", 0.0), ("iso", 0.0)])
 def test_the_robot_is_whole_in_the_picture_and_large(drawn, camera, time):
     alone = drawn(time, camera=camera, background="transparent")
     far = {"iso", "front", "side", "30,50", "-120 deg, 0.3 rad"} & {camera}

@@ -102,7 +102,7 @@ def test_a_damaged_recording_is_refused_with_a_reason(tmp_path, capsys):
         assert f"{name}: cannot be read as a rerun recording" in capsys.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.verify
 def test_a_recording_with_an_odd_name_is_drawn(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_rrd(run, tmp_path / ODD_NAME)
