@@ -4,6 +4,7 @@ import itertools
 import math
 import os
 import time
+from contextlib import suppress
 
 import pytest
 import rclpy
@@ -51,7 +52,8 @@ class NodeProcess:
         return self._process.pid
 
     def send(self, number):
-        os.kill(self.pid, number)
+        with suppress(ProcessLookupError):  # it has ended
+            os.kill(self.pid, number)
 
     def wait_for(self, text):
         """Return once the output has `text`."""

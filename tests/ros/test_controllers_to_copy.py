@@ -24,7 +24,7 @@ CONTROLLERS = ("ramp_controller", "gait_controller", "goal_controller")
 WALK = {"channel": "humidity", "period": 2.4}
 SWIM = {"channel": "light", "period": 0.6, "width": 0.1, "tolerance": 0.002, "axis": [0.0, 0.0, 1.0]}
 GAIT = {"channels": ["left", "right", "hind"], "phases": [0.0, 0.5, 0.25], "period": 0.4, "low": 0.1, "high": 0.6}
-FAST = 4.0
+FAST = 2.0
 """Simulated seconds a second of a run that nobody waits for."""
 
 
