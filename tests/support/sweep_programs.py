@@ -59,6 +59,12 @@ def start_scheduler(file, *options):
     return dask("scheduler", "--host", "127.0.0.1", *quiet, *options)
 
 
+def start_worker(address, folder, *options, **environment):
+    """A worker that nothing watches, with one thread."""
+    quiet = "--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory", str(folder)
+    return dask("worker", address, *quiet, *options, **environment)
+
+
 def address_in(file):
     """The address in that file, once it is there."""
 

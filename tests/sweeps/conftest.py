@@ -1,9 +1,9 @@
-"""A real scheduler and two worker processes on loopback, for all tests of this folder."""
+"""A cluster on loopback, for all tests of this folder."""
 
 import copy
 
 import pytest
-from support.sweep_programs import STRIP, address_in, dask, end, start_scheduler
+from support.sweep_programs import STRIP
 
 
 @pytest.fixture
@@ -12,24 +12,11 @@ def strip():
     return copy.deepcopy(STRIP)
 
 
-@pytest.fixture(scope="session")
-def scheduler(tmp_path_factory):
-    """Address of a scheduler that has no workers yet."""
-    file = tmp_path_factory.mktemp("dask") / "scheduler.json"
-    process = start_scheduler(file)
-    yield address_in(file)
-    end([process])
+@pytest.fixture(scope="module")
+def cluster():
+    """Address of a scheduler with two workers, which are threads of this process: those start at once."""
+    from distributed import LocalCluster
 
-
-@pytest.fixture(scope="session")
-def cluster(scheduler, tmp_path_factory):
-    """Address of that scheduler, with two worker processes."""
-    folder = str(tmp_path_factory.mktemp("workers"))
-    options = "--nthreads", "1", "--no-dashboard", "--local-directory", folder, "--host", "127.0.0.1"
-    workers = [dask("worker", scheduler, *options) for _ in range(2)]
-    from distributed import Client
-
-    with Client(scheduler, set_as_default=False) as client:
-        client.wait_for_workers(2, timeout=60)
-    yield scheduler
-    end(workers)
+    options = {"n_workers": 2, "threads_per_worker": 1, "processes": False}
+    with LocalCluster(protocol="tcp", host="127.0.0.1", dashboard_address=None, **options) as found:
+        yield found.scheduler_address

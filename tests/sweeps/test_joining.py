@@ -1,28 +1,16 @@
 """Workers of a cluster that come during a sweep."""
 
 import pytest
-from support.sweep_programs import address_in, dask, end, start_scheduler
+from support.sweep_programs import address_in, await_workers, end, start_scheduler, start_worker
 
 from bilayer_core.errors import InputError
 from bilayer_core.studies.sweeps.run_sweep import sweep
 
 
 @pytest.fixture
-def small(tmp_path):
-    """Address of a scheduler with one worker, and what starts another one."""
-    file = tmp_path / "scheduler.json"
-    processes = [start_scheduler(file)]
-    options = "--nthreads", "1", "--no-dashboard", "--local-directory", str(tmp_path)
-
-    def start(**environment):
-        processes.append(dask("worker", address_in(file), *options, **environment))
-
-    start()
-    yield address_in(file), start
-    end(processes[::-1])
-
-
-def many_runs(strip):
+def many_runs(strip, monkeypatch):
+    """A sweep that takes longer than a worker to come."""
+    monkeypatch.setattr("bilayer_core.studies.sweeps.dask_processes.COUNT_TIME", 0.5)
     strip["set"]["duration"] = "10 s"
     strip["parameters"]["gain"]["count"] = 5000
     return strip
@@ -32,34 +20,43 @@ class Enough(Exception):
     """Ends a sweep."""
 
 
-@pytest.mark.slow
-def test_a_worker_that_comes_later_takes_runs(strip, small, monkeypatch):
-    monkeypatch.setattr("bilayer_core.studies.sweeps.dask_processes.COUNT_TIME", 0.5)
-    address, start = small
-    took = set()
-    from distributed import Client
+def test_a_worker_that_comes_later_takes_runs(many_runs):
+    from distributed import Client, LocalCluster
 
-    with Client(address, set_as_default=False) as client:
+    options = {"n_workers": 1, "threads_per_worker": 1, "processes": False}
+    took = set()
+    with (
+        LocalCluster(protocol="tcp", host="127.0.0.1", dashboard_address=None, **options) as cluster,
+        Client(cluster.scheduler_address, set_as_default=False) as client,
+    ):
 
         def look(row):
             if row.number == 0:
-                start()
+                cluster.scale(2)
             took.update(worker for worker, runs in client.processing().items() if runs)
             if len(took) == 2:
                 raise Enough
 
         with pytest.raises(Enough):
-            sweep(many_runs(strip), scheduler=address, progress=look)
+            sweep(many_runs, scheduler=cluster.scheduler_address, progress=look)
 
 
 @pytest.mark.slow
-def test_a_worker_with_another_version_that_comes_later_ends_the_sweep_by_name(strip, small, monkeypatch):
-    monkeypatch.setattr("bilayer_core.studies.sweeps.dask_processes.COUNT_TIME", 0.5)
-    address, start = small
+def test_workers_with_another_version_are_refused_before_the_first_run_and_after_it(many_runs, tmp_path):
+    processes = [start_scheduler(tmp_path / "scheduler.json")]
+    try:
+        address = address_in(tmp_path / "scheduler.json")
+        with pytest.raises(InputError, match="has no workers; start some with `dask worker ADDRESS`"):
+            sweep(many_runs, scheduler=address)
+        processes.append(start_worker(address, tmp_path))
+        await_workers(address)
 
-    def look(row):
-        if row.number == 0:
-            start(BILAYER_JIT_PUBLIC="1")
+        def look(row):
+            if row.number == 0:
+                processes.append(start_worker(address, tmp_path, BILAYER_JIT_PUBLIC="1"))  # other compiled code
 
-    with pytest.raises(InputError, match=r"worker tcp://\S+ on \S+ has other versions: sources"):
-        sweep(many_runs(strip), scheduler=address, progress=look)
+        for told in (r"worker tcp://\S+ on \S+", rf"cluster {address}: worker tcp://\S+ on \S+"):
+            with pytest.raises(InputError, match=rf"^{told} has other versions: sources \w+ \(here \w+\)"):
+                sweep(many_runs, scheduler=address, progress=look)
+    finally:
+        end(processes[::-1])

@@ -9,13 +9,13 @@ import sys
 import psutil
 import pytest
 import yaml
-from support.sweep_programs import STRIP, address_in, dask, end, start_scheduler
+from support.sweep_programs import STRIP, address_in, end, start_scheduler, start_worker
 
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
 from bilayer_core.studies.sweeps.run_sweep import read_sweep, sweep
 
-WORKERS = 2
+WORKERS = 1
 STRANGER = """
 import asyncio, json, os, sys
 from distributed import Client, Security, rpc
@@ -65,7 +65,7 @@ def running(tmp_path_factory):
         text=True,
     )
     try:
-        assert program.stderr.readline().startswith(f"{WORKERS} processes of this machine, {WORKERS} runs side by side")
+        assert program.stderr.readline().startswith("one process of this machine, 1 runs side by side")
         yield [psutil.Process(program.pid), *psutil.Process(program.pid).children(recursive=True)], temporary
     finally:
         end([program])
@@ -149,8 +149,7 @@ def closed(tmp_path_factory):
     certificates = pem_files(folder)
     processes = [start_scheduler(folder / "scheduler.json", "--protocol", "tls", *certificates)]
     address = address_in(folder / "scheduler.json")
-    options = "--nthreads", "1", "--no-dashboard", "--local-directory", str(folder), "--host", "tls://127.0.0.1"
-    processes.append(dask("worker", address, *options, *certificates))
+    processes.append(start_worker(address, folder, "--host", "tls://127.0.0.1", *certificates))
     from distributed import Client, Security
 
     names = "tls_ca_file", "tls_client_cert", "tls_client_key"

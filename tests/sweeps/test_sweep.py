@@ -12,7 +12,7 @@ import time
 import pytest
 import yaml
 from support.processes import TIMEOUT, environment
-from support.sweep_programs import address_in, await_workers, dask, end, start_scheduler, wait_until
+from support.sweep_programs import address_in, await_workers, end, start_scheduler, start_worker, wait_until
 
 from bilayer_core import read_results
 from bilayer_core.errors import EngineError, InputError
@@ -37,14 +37,8 @@ def results(found):
     return [(row.number, row.key, row.parameters, row.outcome, row.metrics, row.reason) for row in found.rows]
 
 
-@pytest.fixture(scope="session")
-def strip_rows(cluster):
-    from support.sweep_programs import STRIP
-
-    return results(sweep(STRIP, scheduler=cluster))
-
-
-def test_a_cluster_makes_all_runs_and_this_machine_makes_the_same(strip, strip_rows):
+def test_a_cluster_makes_all_runs_and_this_machine_makes_the_same(strip, cluster):
+    strip_rows = results(sweep(strip, scheduler=cluster))
     assert [row[0] for row in strip_rows] == list(range(8))
     assert {row[3] for row in strip_rows} == {Outcome.DONE}
     assert results(sweep(strip, workers=1)) == strip_rows
@@ -73,73 +67,36 @@ def test_scenes_and_tables_travel_with_the_runs(cluster, tmp_path, monkeypatch):
     assert all(row.metrics["end"] == pytest.approx(7.5, rel=0.02) for row in found.rows)
 
 
-def mark_and_die(run):
-    """Kills the process the first time that it is called with the second gain."""
-    mark = os.environ["SWEEP_TEST_MARK"] if "SWEEP_TEST_MARK" in os.environ else run.simulator.scene.title
-    if run.parameters["gain"] == 1.0 and not os.path.exists(mark):
+def die_hog_or_hang(run):
+    """Never comes back, for the first run; dies the first time that it is called, or takes memory until it is killed."""
+    mark = run.simulator.scene.title
+    if run.parameters["damping"] == 0.0:
+        time.sleep(1000.0)
+    if run.parameters["damping"] == 8.0 and not os.path.exists(mark):
         open(mark, "w").close()
         os.kill(os.getpid(), signal.SIGKILL)
-    return 1.0
+    held = []
+    while run.parameters["damping"] == 9.0:
+        held.append(bytearray(os.urandom(1) * 20_000_000))
+        time.sleep(0.005)
+    return run.parameters["damping"]
 
 
-def test_a_worker_that_is_killed_during_a_run_costs_nothing_but_time(strip, strip_rows, tmp_path):
-    strip["set"]["title"] = str(tmp_path / "died")
-    found = sweep(strip, workers=2, functions={"there": mark_and_die})
+@pytest.mark.slow
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.verify)])
+def test_with_a_process_that_dies_no_run_is_lost_but_those_that_kill_it(strip, tmp_path, monkeypatch, workers):
+    monkeypatch.setattr("bilayer_core.studies.sweeps.dask_processes.LARGEST_PIECE", 4)  # so some wait for the process
+    values = {"path": "damping.mass", "from": 0.0, "to": 20.0, "count": 21}
+    many = strip | {"parameters": {"damping": values}, "set": {"duration": "0.05 s", "title": str(tmp_path / "died")}}
+    limits = {"limits": {"memory": "700 MB", "wall_time": "3 s"}}
+    found = sweep(many | limits, workers=workers, functions={"there": die_hog_or_hang})
     assert (tmp_path / "died").exists()
-    assert [row.metrics["there"] for row in found.rows] == [1.0] * 8
-    assert [row.metrics["curvature"] for row in found.rows] == [row[4]["curvature"] for row in strip_rows]
-
-
-def hog(run):
-    """Takes memory until somebody ends the process, for one gain."""
-    if run.parameters["gain"] == 1.0 and run.parameters["length"] == 80.0:
-        held = []
-        while True:
-            held.append(bytearray(os.urandom(1) * 20_000_000))
-            time.sleep(0.005)
-    return 1.0
-
-
-def hang(run):
-    """Never comes back, for one gain."""
-    if run.parameters["gain"] == 1.0 and run.parameters["length"] == 80.0:
-        time.sleep(1000.0)
-    return 1.0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("function", "limits", "told"),
-    [
-        (hog, {"memory": "700 MB"}, "its process died 2 times; processes are killed beyond 0.7 GB"),
-        (hang, {"wall_time": "4 s"}, "it did not stop within 9 s, and was killed"),
-    ],
-    ids=["memory", "time"],
-)
-def test_a_run_over_its_limits_is_killed_alone_and_is_a_row(strip, monkeypatch, function, limits, told):
-    monkeypatch.setattr("bilayer_core.studies.sweeps.dask_processes.KILL_EXTRA", 1.0)
-    found = sweep(strip | {"limits": limits}, workers=2, functions={"there": function})
-    lost = [row for row in found.rows if row.outcome is not Outcome.DONE]
-    assert [(row.outcome, row.parameters) for row in lost] == [(Outcome.KILLED, {"gain": 1.0, "length": 80.0})]
-    assert told in lost[0].reason or function is hang and "it did not stop within" in lost[0].reason
-    assert found.outcomes == {"done": 7, "killed": 1}
-
-
-def die(run):
-    """Kills the process, always, for one gain in the middle of many."""
-    if run.parameters["gain"] == 1.0:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return 1.0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("workers", [1, 2])
-def test_of_pieces_given_ahead_nothing_is_lost_with_the_process_they_wait_for(strip, workers):
-    gains = {"path": "rods.strip.layers.active.eigenstrain.gain", "from": "0 %", "to": "2 %", "count": 201}
-    many = strip | {"parameters": {"gain": gains}, "set": {"duration": "0.05 s"}}
-    found = sweep(many, workers=workers, functions={"there": die})
-    assert found.outcomes == {"done": 200, "killed": 1}
-    assert [row.parameters for row in found.rows if row.outcome is not Outcome.DONE] == [{"gain": 1.0}]
+    killed = {row.parameters["damping"]: row.reason for row in found.rows if row.outcome is Outcome.KILLED}
+    assert killed.pop(0.0) == "it did not stop within 16 s, and was killed"
+    assert killed == {9.0: "its process died 2 times; processes are killed beyond 0.7 GB"}
+    assert found.outcomes == {"done": 19, "killed": 2}
+    done = [row for row in found.rows if row.outcome is Outcome.DONE]
+    assert all(row.metrics["there"] == row.parameters["damping"] for row in done)
 
 
 TWICE = """
@@ -151,7 +108,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.slow
+@pytest.mark.verify
 def test_one_program_makes_two_sweeps(tmp_path):
     (tmp_path / "twice.py").write_text(TWICE)
     run = [sys.executable, tmp_path / "twice.py"]
@@ -175,23 +132,6 @@ def test_what_is_no_address_is_an_input_error(strip, address):
         sweep(strip, scheduler=address)
 
 
-@pytest.mark.slow
-def test_workers_with_another_version_are_refused_before_the_first_run(strip, tmp_path):
-    file = tmp_path / "scheduler.json"
-    processes = [start_scheduler(file)]
-    try:
-        address = address_in(file)
-        options = address, "--nthreads", "1", "--no-dashboard", "--local-directory", str(tmp_path)
-        with pytest.raises(InputError, match="has no workers; start some with `dask worker ADDRESS`"):
-            sweep(strip, scheduler=address)
-        processes.append(dask("worker", *options, BILAYER_JIT_PUBLIC="1"))  # other compiled code
-        await_workers(address)
-        with pytest.raises(InputError, match=r"has other versions: sources \w+ \(here \w+\)"):
-            sweep(strip, scheduler=address)
-    finally:
-        end(processes[::-1])
-
-
 def test_logs_need_a_directory_that_workers_see(strip, cluster, tmp_path, monkeypatch):
     found = sweep(strip | {"logs": "all"}, scheduler=cluster, out=tmp_path / "here")
     assert sorted(row.log for row in found.rows) == [f"logs/{k:06d}.mcap" for k in range(8)]
@@ -212,8 +152,7 @@ def test_a_scheduler_that_goes_is_told_and_what_is_done_is_kept(strip, tmp_path)
     processes = [start_scheduler(file)]
     try:
         address = address_in(file)
-        options = address, "--nthreads", "1", "--no-dashboard", "--local-directory", str(tmp_path)
-        processes.append(dask("worker", *options))
+        processes.append(start_worker(address, tmp_path))
         await_workers(address)
         seen = []
 
@@ -232,7 +171,7 @@ def test_a_scheduler_that_goes_is_told_and_what_is_done_is_kept(strip, tmp_path)
 MOMENTS = int(os.environ.get("SWEEP_KILLS", "5"))
 
 
-@pytest.mark.slow
+@pytest.mark.verify
 @pytest.mark.timeout(1800)
 def test_a_sweep_killed_at_random_moments_is_completed_and_nothing_is_made_twice(strip, tmp_path):
     rng = random.Random(int(os.environ.get("SWEEP_KILLS_SEED", "7")))
@@ -284,7 +223,7 @@ def test_ctrl_c_ends_a_sweep_with_one_line_and_its_processes_with_it(strip, tmp_
     strip["set"]["duration"] = "40 s"
     strip["parameters"]["gain"]["count"] = 200
     (tmp_path / "sweep.yaml").write_text(yaml.safe_dump(strip))
-    command = [*COMMAND, "sweep", "sweep.yaml", "--out", "out", "--quiet"]
+    command = [*COMMAND, "sweep", "sweep.yaml", "--out", "out", "--quiet", "--workers", "1"]
     program = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, start_new_session=True)
     file = tmp_path / "out/results.sqlite"
 
@@ -296,8 +235,7 @@ def test_ctrl_c_ends_a_sweep_with_one_line_and_its_processes_with_it(strip, tmp_
     assert program.wait(30) == 130
     assert program.stderr.read() == "bilayer: interrupted\n"
     wait_until(lambda: not processes_of_group(program.pid), 10)
-    found = subprocess.run([*command, "--resume", "--list"], cwd=tmp_path, capture_output=True, text=True)
-    assert found.returncode == 0 and len(found.stdout.splitlines()) == 401
+    assert kept_keys(file)
 
 
 def processes_of_group(group):
