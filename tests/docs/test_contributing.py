@@ -12,21 +12,31 @@ import pytest
 NEW_FILE = re.compile(r"New file `([^`]+)`:\n\n```python\n(.*?)```", re.S)
 INSERTED = re.compile(r"In `([^`]+)`, after the line `([^`]+)`:\n\n```python\n(.*?)```", re.S)
 MOST_FILES = 5
-PROGRAM = """
-import json
-
-import numpy as np
+SCENE = """
 from support.sample_scenes import layer, rod, scene
 
-from bilayer_core import Simulator, load_scene
-from bilayer_core.engine.evaluator import Evaluator
+from bilayer_core import load_scene
 
 strip = rod([layer(thickness=2e-3)], length=0.05, stations=6)
 springs = [
     {"rod": "rod", "station": 0, "anchor": [0, 0, 0], "stiffness": 5.0},
     {"rod": "rod", "station": 5, "anchor": [0.05, 0, 0], "stiffness": 5.0},
 ]
-simulator = Simulator(load_scene(scene([strip], gravity=[0, 0, -9.81], springs=springs)))
+loaded = load_scene(scene([strip], gravity=[0, 0, -9.81], springs=springs))
+"""
+KNOWN = """
+from bilayer_core.forces.force_register import TERMS
+print(len(loaded.springs), *[name for term in TERMS for name in term.names])
+"""
+PROGRAM = """
+import json
+
+import numpy as np
+
+from bilayer_core import Simulator
+from bilayer_core.engine.evaluator import Evaluator
+
+simulator = Simulator(loaded)
 simulator.solve_static()
 ends = simulator.positions[[0, 5]]
 model, state = simulator.model, simulator._state
@@ -62,8 +72,9 @@ print(json.dumps({
 """
 
 
-@pytest.mark.slow
-def test_a_force_added_by_the_recipe_acts_with_tested_derivatives_and_a_listed_energy(root, tmp_path):
+@pytest.fixture
+def python_with_force(root, tmp_path):
+    """Runs a program where the sources are a copy that has the force of the recipe."""
     page = (root / "docs/contributing.md").read_text(encoding="utf-8")
     page = page[page.index("## Add a force") : page.index("## Add an integrator")]
     tree = tmp_path / "tree"
@@ -85,9 +96,23 @@ def test_a_force_added_by_the_recipe_acts_with_tested_derivatives_and_a_listed_e
         "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
         "BILAYER_JIT_AHEAD": "0",
     }
-    run = subprocess.run([sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, cwd=tree)
-    assert run.returncode == 0, run.stderr
-    found = json.loads(run.stdout)
+
+    def run(program):
+        command = [sys.executable, "-c", program]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, cwd=tree)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    return run
+
+
+def test_a_force_added_by_the_recipe_is_registered_and_in_scenes(python_with_force):
+    assert python_with_force(SCENE + KNOWN).split()[:2] == ["2", "springs"]
+
+
+@pytest.mark.verify
+def test_a_force_added_by_the_recipe_acts_with_tested_derivatives_and_a_listed_energy(python_with_force):
+    found = json.loads(python_with_force(SCENE + PROGRAM))
     left, right = (-end[2] for end in found["ends"])
     assert found["terms"]["springs"] == "active" and found["stable"]
     assert 5.0 * left == pytest.approx(0.5 * found["weight"], rel=1e-6)  # each bears half of the weight

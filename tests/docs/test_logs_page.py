@@ -3,11 +3,9 @@
 import os
 import shutil
 import subprocess
-import sys
 
 import pytest
-from support.documents import blocks, is_told
-from support.processes import TIMEOUT, environment
+from support.documents import blocks, is_told, pasted
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.log.file.mcap_log import McapRecorder
@@ -17,32 +15,34 @@ MCAP_INCLUDE = os.environ.get("MCAP_INCLUDE", "")
 PAGE = "docs/logs.md"
 
 
+def outputs_of(page, kind):
+    """What the programs or commands of a page print, one after the other."""
+    known, outputs = {}, ""
+    for block in blocks(page):
+        if block.info == kind:
+            code, output = pasted(block, known)
+            assert code == 0, f"line {block.line}:\n{output}"
+            outputs += output
+    return outputs
+
+
 @pytest.mark.slow
-def test_the_programs_and_commands_of_the_page_about_logs_do_what_it_says(root, tmp_path):
-    told = blocks(root / PAGE)
-    program = "\n".join(block.text for block in told if block.info == "python")
-    script = f'bilayer() {{ "{sys.executable}" -m bilayer_core "$@"; }}\n'
-    script += "\n".join(block.text for block in told if block.info == "sh")
-    outputs = []
-    for command in ([sys.executable, "-c", program], ["bash", "-e", "-c", script]):
-        done = subprocess.run(command, cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=TIMEOUT)
-        assert done.returncode == 0, done.stdout + done.stderr
-        outputs.append(done.stdout)
-    assert "RunData(bending: t = 0 to 0.4 s, 21 frames" in outputs[0] and "(9, " in outputs[0]
+def test_the_programs_and_commands_of_the_page_about_logs_do_what_it_says(root, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    printed, told = (outputs_of(root / PAGE, kind) for kind in ("python", "sh"))
+    assert "RunData(bending: t = 0 to 0.4 s, 21 frames" in printed and "(9, " in printed
     assert (tmp_path / "height.pdf").stat().st_size > 1000
-    for block in told:
+    for block in blocks(root / PAGE):
         if block.info == "text":
-            assert is_told(block.text, outputs[1]) is None
+            assert is_told(block.text, told) is None
 
 
 @pytest.mark.slow
-def test_the_programs_of_the_page_about_python_run(root, tmp_path):
-    program = "\n".join(block.text for block in blocks(root / "docs/python.md") if block.info == "python")
-    command = [sys.executable, "-c", program]
-    done = subprocess.run(command, cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=TIMEOUT)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "Simulator(gripping at t = 0 s" in done.stdout and "Termination.STOPPED" in done.stdout
-    assert "Recorder(gripping: t = " in done.stdout and done.stdout.rstrip().endswith("True")
+def test_the_programs_of_the_page_about_python_run(root, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    printed = outputs_of(root / "docs/python.md", "python")
+    assert "Simulator(gripping at t = 0 s" in printed and "Termination.STOPPED" in printed
+    assert "Recorder(gripping: t = " in printed and printed.rstrip().endswith("True")
 
 
 @pytest.mark.slow

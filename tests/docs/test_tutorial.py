@@ -2,16 +2,14 @@
 
 import importlib.util
 import os
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from support.documents import Block, blocks, is_told
-from support.processes import TIMEOUT, claimed_domain, environment
+from support.documents import Block, blocks, is_told, pasted
+from support.processes import claimed_domain, environment
 
 MODULES = {
-    "bilayer": "bilayer_core",
     "sim_node": "bilayer_sim_ros.sim_node",
     "ramp_controller": "bilayer_sim_ros.controllers.ramp_controller",
 }
@@ -22,7 +20,7 @@ ROS_IS_THERE = importlib.util.find_spec("rclpy") is not None
 
 @pytest.fixture
 def commands(tmp_path):
-    """Environment in which the commands of an installation are those of this checkout."""
+    """Environment in which the nodes of an installation are those of this checkout."""
     directory = tmp_path / "bin"
     directory.mkdir()
     for name, module in MODULES.items():
@@ -31,20 +29,6 @@ def commands(tmp_path):
         path.chmod(0o755)
     with claimed_domain() as domain:
         yield environment() | {"PATH": f"{directory}{os.pathsep}{os.environ['PATH']}", "ROS_DOMAIN_ID": str(domain)}
-
-
-def finished(block: Block, place: Path, environment: dict[str, str]) -> subprocess.CompletedProcess:
-    """Run a block to its end; both outputs are one."""
-    shell = ["bash", "-e", "-c"] if block.info.startswith("sh") else [sys.executable, "-c"]
-    return subprocess.run(
-        [*shell, block.text],
-        cwd=place,
-        env=environment,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=TIMEOUT,
-    )
 
 
 def edit(block: Block, path: Path) -> None:
@@ -57,7 +41,8 @@ def edit(block: Block, path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_every_step_of_the_tutorial_does_what_it_says(root, tmp_path, commands):
+def test_every_step_of_the_tutorial_does_what_it_says(root, tmp_path, monkeypatch, commands):
+    monkeypatch.chdir(tmp_path)
     steps = [block for block in blocks(root / "docs/tutorial.md") if block.info != "console"]
     done = 0
     for step, after in zip(steps, [*steps[1:], Block("", "", 0)], strict=True):
@@ -65,11 +50,10 @@ def test_every_step_of_the_tutorial_does_what_it_says(root, tmp_path, commands):
             edit(step, tmp_path / EDITED)
         elif step.info in RUN and (ROS_IS_THERE or step.info != "sh ros"):
             expected = after.text if after.info == "text" else ""
-            run = finished(step, tmp_path, commands)
-            code = 2 if expected.startswith("bilayer:") else 0  # one message, and nothing else
-            assert run.returncode == code, f"line {step.line}:\n{run.stdout}"
-            missing = is_told(expected, run.stdout)
-            assert missing is None, f"line {step.line}: {missing!r} is not in order in:\n{run.stdout}"
+            code, output = pasted(step, {}, commands)
+            assert code == (2 if expected.startswith("bilayer:") else 0), f"line {step.line}:\n{output}"
+            missing = is_told(expected, output)
+            assert missing is None, f"line {step.line}: {missing!r} is not in order in:\n{output}"
             done += 1
     assert done >= (9 if ROS_IS_THERE else 7)
 
