@@ -1,4 +1,4 @@
-"""Logs of programs that are killed at random moments: ten by default; more, and others:
+"""Logs of programs that are killed at random moments: one of each by default; more, and others:
 
 KILLS=200 KILLS_SEED=7 pytest -m "" -s tests/logs/test_kills.py
 """
@@ -9,7 +9,7 @@ import pytest
 from support.kills import kills
 from support.processes import claimed_domain
 
-KILLS = int(os.environ.get("KILLS", "10"))
+KILLS = int(os.environ.get("KILLS", "2"))
 SEED = int(os.environ.get("KILLS_SEED", "1"))
 MOST_MISSING = 1.0
 """Wall time of which frames may be missing [s]."""

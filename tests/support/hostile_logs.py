@@ -43,6 +43,8 @@ from bilayer_core.log.messages.topics import output_topics
 from bilayer_core.observed.frame import Description
 
 GIGABYTE = 1 << 30
+UNPACKED = 1 << 28
+"""Size of a state, a few times the memory that its reader may take [bytes]."""
 STATE = 1
 """Number of the topic of states."""
 
@@ -127,8 +129,8 @@ def _many_topics() -> bytes:
     """A chunk of topics with a hundred thousand keys each."""
     metadata = {f"{number:06}": "" for number in range(60_000)}
     one = Channel(id=2, topic="/x", message_encoding="", schema_id=0, metadata=metadata)
-    channels = [packed(one)[:9] + struct.pack("<H", number) + packed(one)[11:] for number in range(2, 92)]
-    data = b"".join(channels)
+    text = packed(one)
+    data = b"".join(text[:9] + struct.pack("<H", number) + text[11:] for number in range(2, 92))
     return chunk("zstd", zstandard.compress(data), len(data))
 
 
@@ -141,14 +143,14 @@ def _large_index(description: Description) -> bytes:
 
 
 def _same_chunk(description: Description) -> bytes:
-    """An index that names one chunk a million times."""
+    """An index that names one chunk many times, of sixty million messages."""
     data = _with_chunks(description)
     inside = messages(1000)
     one = chunk("", inside, len(inside))
     times = {"message_start_time": 0, "message_end_time": 10**9, "message_index_offsets": {}, "message_index_length": 0}
     sizes = {"compression": "", "compressed_size": len(inside), "uncompressed_size": len(inside)}
     entry = ChunkIndex(chunk_start_offset=len(data), chunk_length=len(one), **times, **sizes)
-    return finished(data + one, definitions() + packed(entry) * 300_000)
+    return finished(data + one, definitions() + packed(entry) * 60_000)
 
 
 def logs(description: Description) -> dict[str, bytes]:
@@ -228,12 +230,12 @@ def _member(shape: tuple[int, ...], kind: str, data: bytes) -> bytes:
 
 
 def write_states(folder: Path, layout: str) -> list[Path]:
-    """Write saved states that unpack to gigabytes, or declare so."""
+    """Write saved states that unpack to `UNPACKED`, or declare far more."""
     text = np.array(layout)
     one = _member((), text.dtype.str, text.tobytes())
     members = {
-        "state of zeros": {"state": _member((GIGABYTE // 8,), "<f8", bytes(GIGABYTE)), "layout": one},
-        "layout of zeros": {"state": b"", "layout": _member((), f"<U{GIGABYTE // 4}", bytes(GIGABYTE))},
+        "state of zeros": {"state": _member((UNPACKED // 8,), "<f8", bytes(UNPACKED)), "layout": one},
+        "layout of zeros": {"state": b"", "layout": _member((), f"<U{UNPACKED // 4}", bytes(UNPACKED))},
         "shape without values": {"state": _member((2**40,), "<f8", b""), "layout": one},
         "header of a gigabyte": {"state": b"\x93NUMPY\x02\0" + struct.pack("<I", 2**31) + b"{", "layout": one},
     }
