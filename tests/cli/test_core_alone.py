@@ -25,7 +25,7 @@ WORKS = {
     "schema": [],
     "check": ["cantilever"],
     "run": ["cantilever", "--duration", "2 ms", "--log", "simulated.mcap", "--summary", "run.json", "--quiet"],
-    "converge": ["cantilever", "--duration", "2 ms"],
+    "converge": ["cantilever", "--duration", "2 ms", "--workers", "1"],
     "validate": ["--only", "laminate/two*", "--quick"],
     "info": ["run.mcap"],
     "repair": ["run.mcap", "repaired.mcap"],

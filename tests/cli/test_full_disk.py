@@ -1,5 +1,7 @@
 """Disks that are full, two writers on one file, and output that nobody takes."""
 
+import contextlib
+import io
 import json
 import os
 import resource
@@ -12,6 +14,7 @@ import pytest
 from support import synthetic_run
 from support.processes import TIMEOUT, bilayer, command, environment
 
+from bilayer_core.cli import main
 from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_core.log.run.log_reader import read_info, read_log
 
@@ -29,35 +32,41 @@ def here(tmp_path, monkeypatch):
 @pytest.fixture(scope="module", autouse=True)
 def compiled():
     """Kernels are kept before files may not be large."""
-    assert bilayer("run", "cantilever", "--duration", "2 ms", "--quiet").returncode == 0
+    assert main(["run", "cantilever", "--duration", "2 ms", "--quiet"]) == 0
 
 
-NO_BYTECODE = {"PYTHONDONTWRITEBYTECODE": "1"}
-"""Python would keep what it could write of it."""
+@pytest.fixture
+def with_room(monkeypatch):
+    """Runs ``bilayer`` in this process, in which no file may meanwhile have more than so many bytes; exit code, standard
+    output and standard error.
+    """
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
+
+    def run(size, *arguments):
+        out, err = io.StringIO(), io.StringIO()
+        before = resource.getrlimit(resource.RLIMIT_FSIZE)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+        try:
+            with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+                code = main(list(arguments))
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        return code, out.getvalue(), err.getvalue()
+
+    return run
 
 
-def with_room(size, *arguments):
-    """Run ``bilayer`` where no file may have more than `size` bytes."""
-
-    def limit():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
-
-    variables = environment() | NO_BYTECODE
-    return subprocess.run(
-        command(*arguments), env=variables, capture_output=True, text=True, timeout=TIMEOUT, preexec_fn=limit
-    )
-
-
-def test_a_log_that_cannot_be_begun_ends_with_3_and_leaves_no_file(here):
-    run = with_room(100, "run", "cantilever", "--duration", "0.1", "--log", "run.mcap", "--quiet")
-    assert (run.returncode, run.stderr) == (3, f"bilayer: run.mcap: cannot be written: {FULL}\n")
+def test_a_log_that_cannot_be_begun_ends_with_3_and_leaves_no_file(here, with_room):
+    code, _, err = with_room(100, "run", "cantilever", "--duration", "0.1", "--log", "run.mcap", "--quiet")
+    assert (code, err) == (3, f"bilayer: run.mcap: cannot be written: {FULL}\n")
     assert list(here.iterdir()) == []
 
 
-def test_a_log_that_finds_no_room_is_named_with_what_is_kept_and_the_summary_is_written(here):
-    run = with_room(300_000, "run", "cantilever", "--duration", "100", "--log", "run.mcap", "--summary", "run.json")
-    assert run.returncode == 3 and run.stdout.startswith("cantilever: failed")
-    line, _, kept = run.stderr.partition(f"the log run.mcap could not be written: {FULL}; it can be read up to t = ")
+def test_a_log_that_finds_no_room_is_named_with_what_is_kept_and_the_summary_is_written(here, with_room):
+    outputs = ["--log", "run.mcap", "--summary", "run.json"]
+    code, out, err = with_room(300_000, "run", "cantilever", "--duration", "100", *outputs)
+    assert code == 3 and out.startswith("cantilever: failed")
+    line, _, kept = err.partition(f"the log run.mcap could not be written: {FULL}; it can be read up to t = ")
     assert line.startswith("bilayer: stopped at t = ") and kept.endswith(" s (0.3 MB)\n")
     assert float(kept.split()[0]) == pytest.approx(read_info("run.mcap").last_time)
     assert len(read_log("run.mcap").times) > 1
@@ -65,11 +74,11 @@ def test_a_log_that_finds_no_room_is_named_with_what_is_kept_and_the_summary_is_
     assert summary["termination"] == "failed" and FULL in summary["reason"]
 
 
-def test_the_first_loss_is_told_first_and_later_ones_below_it(here):
+def test_the_first_loss_is_told_first_and_later_ones_below_it(here, with_room):
     outputs = ["--log", "run.mcap", "--save-state", "run.npz", "--summary", "run.json"]
-    run = with_room(1000, "run", "cantilever", "--duration", "0.1", *outputs, "--quiet")
-    assert run.returncode == 3
-    assert run.stderr.splitlines() == [
+    code, _, err = with_room(1000, "run", "cantilever", "--duration", "0.1", *outputs, "--quiet")
+    assert code == 3
+    assert err.splitlines() == [
         f"bilayer: run.mcap: cannot be written: {FULL}",
         f"  then run.npz: cannot be written: {FULL}",
         f"  then run.json: cannot be written: {FULL}",
@@ -77,25 +86,26 @@ def test_the_first_loss_is_told_first_and_later_ones_below_it(here):
     assert list(here.iterdir()) == []
 
 
-def test_a_summary_without_room_leaves_the_old_one(here):
+def test_a_summary_without_room_leaves_the_old_one(here, with_room):
     (here / "run.json").write_text("old")
-    run = with_room(1000, "run", "cantilever", "--duration", "2 ms", "--summary", "run.json", "--force", "--quiet")
-    assert (run.returncode, run.stderr) == (3, f"bilayer: run.json: cannot be written: {FULL}\n")
+    words = ["run", "cantilever", "--duration", "2 ms", "--summary", "run.json", "--force", "--quiet"]
+    code, _, err = with_room(1000, *words)
+    assert (code, err) == (3, f"bilayer: run.json: cannot be written: {FULL}\n")
     assert [path.read_text() for path in here.iterdir()] == ["old"]
 
 
-def test_a_recording_whose_end_finds_no_room_is_not_left_as_if_it_were_whole(here):
-    assert bilayer("run", "cantilever", "--duration", "0.1", "--log", "run.mcap", "--quiet").returncode == 0
-    assert bilayer("view", "run.mcap", "--save", "whole.rrd").returncode == 0
+def test_a_recording_whose_end_finds_no_room_is_not_left_as_if_it_were_whole(here, with_room):
+    assert main(["run", "cantilever", "--duration", "0.1", "--log", "run.mcap", "--quiet"]) == 0
+    assert main(["view", "run.mcap", "--save", "whole.rrd"]) == 0
     room = (here / "whole.rrd").stat().st_size - 1000
-    view = with_room(room, "view", "run.mcap", "--save", "part.rrd")
-    assert (view.returncode, view.stderr) == (3, f"bilayer: part.rrd: cannot be written: {FULL}\n")
+    code, _, err = with_room(room, "view", "run.mcap", "--save", "part.rrd")
+    assert (code, err) == (3, f"bilayer: part.rrd: cannot be written: {FULL}\n")
     assert sorted(path.name for path in here.iterdir()) == ["run.mcap", "whole.rrd"]
 
 
-def test_a_new_scene_without_room_leaves_no_file_and_says_why(here):
-    new = with_room(100, "new", "robot.yaml")
-    assert (new.returncode, new.stderr) == (3, f"bilayer: robot.yaml: cannot be written: {FULL}\n")
+def test_a_new_scene_without_room_leaves_no_file_and_says_why(here, with_room):
+    code, _, err = with_room(100, "new", "robot.yaml")
+    assert (code, err) == (3, f"bilayer: robot.yaml: cannot be written: {FULL}\n")
     assert list(here.iterdir()) == []
 
 
@@ -126,15 +136,15 @@ WRITERS = {
 
 
 @pytest.mark.parametrize("arguments", WRITERS)
-def test_a_command_names_the_file_that_found_no_room_and_nothing_else(here, log, arguments):
+def test_a_command_names_the_file_that_found_no_room_and_nothing_else(here, with_room, log, arguments):
     words = [str(log) if word == "LOG" else word for word in arguments.split()]
-    ended = with_room(400, *words)
-    assert (ended.returncode, ended.stderr) == (3, f"bilayer: {WRITERS[arguments]}: cannot be written: {FULL}\n")
+    code, _, err = with_room(400, *words)
+    assert (code, err) == (3, f"bilayer: {WRITERS[arguments]}: cannot be written: {FULL}\n")
     assert list(here.iterdir()) == []
 
 
 def test_kernels_that_find_no_room_are_an_error_that_says_what_to_do(here):
-    variables = {"NUMBA_CACHE_DIR": str(here), "BILAYER_JIT_AHEAD": "0"} | NO_BYTECODE
+    variables = {"NUMBA_CACHE_DIR": str(here), "BILAYER_JIT_AHEAD": "0", "PYTHONDONTWRITEBYTECODE": "1"}
 
     def limit():
         resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
@@ -151,23 +161,23 @@ def test_kernels_that_find_no_room_are_an_error_that_says_what_to_do(here):
     assert f"compiled kernels cannot be kept: {FULL}; set NUMBA_CACHE_DIR to a directory with room" in run.stderr
 
 
-PRINTING = [
-    ("scenes",),
-    ("schema",),
-    ("check", "gripping", "--json"),
-    ("validate", "--list"),
-    ("run", "cantilever", "--duration", "2 ms"),
-]
+REFUSED = "bilayer: standard output: cannot be written: No space left on device\n"
+RUN = ("run", "cantilever", "--duration", "2 ms")
 
 
-@pytest.mark.parametrize("arguments", PRINTING, ids=lambda arguments: arguments[0])
 @pytest.mark.parametrize(
-    ("redirection", "code", "told"),
+    ("arguments", "redirection", "code", "told"),
     [
-        (">&-", 0, ""),
-        (">&- 2>&-", 0, ""),
-        (">/dev/full", 3, "bilayer: standard output: cannot be written: No space left on device\n"),
-        (">/dev/full 2>/dev/full", 3, ""),
+        (("scenes",), ">&-", 0, ""),
+        (("scenes",), ">&- 2>&-", 0, ""),
+        (("scenes",), ">/dev/full", 3, REFUSED),
+        (("scenes",), ">/dev/full 2>/dev/full", 3, ""),
+        (("schema",), ">&- 2>&-", 0, ""),
+        (("check", "gripping", "--json"), ">&-", 0, ""),
+        (("validate", "--list"), ">/dev/full", 3, REFUSED),
+        (RUN, ">&- 2>&-", 0, ""),
+        (RUN, ">/dev/full", 3, REFUSED),
+        (RUN, ">/dev/full 2>/dev/full", 3, ""),
     ],
 )
 def test_output_that_is_closed_or_full_ends_in_at_most_a_line(here, arguments, redirection, code, told):

@@ -15,6 +15,7 @@ from bilayer_core.cli.signals import Interruption, Signals, interruption_behind
 from bilayer_core.log.run.log_reader import read_info
 
 LINES = {signal.SIGINT: "bilayer: interrupted\n", signal.SIGTERM: "bilayer: ended by SIGTERM\n"}
+INTERRUPT_OR_ALL = signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.verify)
 LONG_RUN = ("run", "cantilever", "--dt", "0.1 ms", "--duration", "1000", "--quiet")
 READ_AGAIN = """
 import sys
@@ -83,8 +84,8 @@ def assert_ended_by(number, process):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("times", [1, 2, 3])
-@pytest.mark.parametrize("number", LINES)
+@pytest.mark.parametrize("times", [1, pytest.param(2, marks=pytest.mark.verify), 3])
+@pytest.mark.parametrize("number", INTERRUPT_OR_ALL)
 def test_a_signal_at_any_moment_of_the_start_is_one_line(tmp_path, number, times):
     for delay in (0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0):
         with started(*LONG_RUN, cwd=tmp_path) as process:
@@ -113,7 +114,7 @@ def test_every_verb_that_computes_or_imports_ends_with_one_line(tmp_path, argume
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [*LINES, signal.SIGKILL])
+@pytest.mark.parametrize("number", [*INTERRUPT_OR_ALL, signal.SIGKILL])
 def test_processes_that_compile_end_with_the_program_and_leave_a_cache_that_works(tmp_path, number):
     variables = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "BILAYER_JIT_AHEAD": "1"}
     with started(*LONG_RUN, cwd=tmp_path, **variables) as process:
@@ -146,7 +147,7 @@ def test_a_signal_while_a_run_itself_compiles_is_one_line(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [*LINES, signal.SIGKILL])
+@pytest.mark.parametrize("number", [*INTERRUPT_OR_ALL, signal.SIGKILL])
 def test_runs_side_by_side_end_with_the_program(tmp_path, number):
     study = ("converge", "cantilever", "--set", "solver.dt=0.1 ms", "--duration", "1000", "--workers", "2", "--quiet")
     with started(*study, cwd=tmp_path) as process:

@@ -22,7 +22,7 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
 from fuzz.cases import FAMILIES, Case
-from fuzz.worker import ACCEPTED, FAILED, REFUSED, Outcome, Unclear, Workers, require_clear
+from fuzz.worker import ACCEPTED, FAILED, REFUSED, Outcome, Unclear, Workers, limit_memory, require_clear
 
 SCENES = int(os.environ.get("FUZZ_SCENES", "150"))
 SEED = int(os.environ.get("FUZZ_SEED", "1"))
@@ -101,9 +101,9 @@ def test_a_process_that_exceeds_its_limits_or_dies_counts_as_a_failure():
     told = []
     for longest, *calls in (
         (0.3, (bytearray, 2 * 10**9), (time.sleep, 60)),
-        (2.0, (sum, range(10**12)), (os.abort,), (bytearray, 10)),  # on a busy machine too, CPU time is over first
+        (1.0, (sum, range(10**12)), (os.abort,), (bytearray, 10)),  # on a busy machine too, CPU time is over first
     ):
-        workers = Workers(longest=longest, most_memory=1e9)
+        workers = Workers(longest=longest, most_memory=1e9, prepare=limit_memory)
         told += [workers.result(begun) for begun in [workers.start(*call) for call in calls]]
         workers.close()
     assert [outcome.kind for outcome in told[:4]] == [FAILED] * 4 and told[4] == bytearray(10)

@@ -67,7 +67,7 @@ class Unclear(Exception):
 
 
 def begin(most_memory: float, with_steps: bool) -> None:
-    """Prepare a process: what all scenes need is imported, and memory is limited to what it has by then and more."""
+    """Prepare a process: what all scenes need is imported before memory is limited."""
     from bilayer_core import Simulator, load_scene
     from bilayer_core.cli.check import check  # noqa: F401 (imported)
 
@@ -78,6 +78,11 @@ def begin(most_memory: float, with_steps: bool) -> None:
         warm = Simulator(load_scene(known))
         if with_steps:
             warm.step()
+    limit_memory(most_memory)
+
+
+def limit_memory(most_memory: float, with_steps: bool = False) -> None:
+    """Limit the memory of this process to what it has and more [bytes]."""
     size = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
     resource.setrlimit(resource.RLIMIT_AS, (size + int(most_memory), resource.RLIM_INFINITY))
 
@@ -199,9 +204,16 @@ def _limited(cpu_time: float, function: Callable, arguments: tuple) -> Any:
 class Workers:
     """A process that scenes are tried in; it is replaced when it exceeds a limit or dies."""
 
-    def __init__(self, with_steps: bool = False, longest: float = LONGEST, most_memory: float = MOST_MEMORY):
+    def __init__(
+        self,
+        with_steps: bool = False,
+        longest: float = LONGEST,
+        most_memory: float = MOST_MEMORY,
+        prepare: Callable[[float, bool], None] = begin,
+    ):
         self._with_steps, self._longest = with_steps, longest
-        self._pool = ProcessPool(1, context=get_context("spawn"), initializer=begin, initargs=(most_memory, with_steps))
+        limits = most_memory, with_steps
+        self._pool = ProcessPool(1, context=get_context("spawn"), initializer=prepare, initargs=limits)
 
     def outcome(self, case: Case) -> Outcome:
         """What becomes of a case."""

@@ -86,7 +86,12 @@ def test_info_takes_no_more_memory_for_a_hostile_log_than_documented(hostile, tm
 
 
 REFUSING = ["view LOG --save out.rrd", "replay LOG --verify"]
-BY_BLOCKS = ["export LOG rod/*/strain --npz out.npz", "plot LOG com --out out.svg", "repair LOG out.mcap", "compare LOG LOG"]
+BY_BLOCKS = [
+    "export LOG rod/*/strain --npz out.npz",
+    "plot LOG com --out out.svg",
+    "repair LOG out.mcap",
+    "compare LOG LOG",
+]
 
 
 @pytest.mark.slow

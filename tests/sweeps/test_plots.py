@@ -23,8 +23,8 @@ def result(points, about, metric=lambda **of: sum(of.values())):
     return SweepResult(rows, about)
 
 
-def about(*names, **rest):
-    return Columns(names, ("height", "cost"), **rest)
+def about(*names, metrics=("height", "cost"), **rest):
+    return Columns(names, metrics, **rest)
 
 
 def grid(count):
@@ -38,8 +38,8 @@ def pixels(path):
 
 
 def test_one_parameter_gives_lines_two_a_map_more_parallel_coordinates(tmp_path):
-    one = draw(result([{"a": float(k)} for k in range(5)], about("a")), tmp_path)
-    assert [path.name for path in one] == ["lines_height.png", "lines_cost.png"]
+    one = draw(result([{"a": float(k)} for k in range(5)], about("a", metrics=["height"])), tmp_path)
+    assert [path.name for path in one] == ["lines_height.png"]
     two = draw(result(grid(3), about("a", "b")), tmp_path)
     assert [path.name for path in two] == ["lines_height.png", "map_height.png", "lines_cost.png", "map_cost.png"]
     many = [{"a": float(k), "b": float(k % 3), "c": float(k % 5)} for k in range(15)]
@@ -58,7 +58,10 @@ def test_a_map_has_the_colour_of_each_value_at_its_place(tmp_path):
     (tmp_path / "a").mkdir(), (tmp_path / "b").mkdir()
     paths = []
     for name, sign in (("a", 1.0), ("b", -1.0)):
-        draw(result(grid(2), about("a", "b"), lambda a, b, sign=sign: sign * (a + 2.0 * b)), tmp_path / name)
+        draw(
+            result(grid(2), about("a", "b", metrics=["height"]), lambda a, b, sign=sign: sign * (a + 2.0 * b)),
+            tmp_path / name,
+        )
         paths.append(tmp_path / name / "map_height.png")
     image, other = pixels(paths[0]), pixels(paths[1])
     low, high = np.array([68, 1, 84]), np.array([253, 231, 37])  # the ends of viridis
@@ -82,7 +85,7 @@ def test_cells_of_a_map_are_centred_on_their_values_on_both_kinds_of_axes():
 
 def test_the_legend_of_lines_stands_beside_them(tmp_path):
     points = [{"a": float(k), "b": b} for k in range(6) for b in (1.0, 2.0, 3.0)]
-    image = pixels(draw(result(points, about("a", "b"), lambda a, b: b), tmp_path)[0])
+    image = pixels(draw(result(points, about("a", "b", metrics=["height"]), lambda a, b: b), tmp_path)[0])
     coloured = np.nonzero(image.max(axis=2) - image.min(axis=2) > 60)
     lines = coloured[1][(coloured[0] > 0.5 * image.shape[0])]
     # level lines end with the field; what is coloured to the right of it is the legend
@@ -90,9 +93,9 @@ def test_the_legend_of_lines_stands_beside_them(tmp_path):
 
 
 def test_runs_that_are_not_done_are_marked_on_the_map(tmp_path):
-    whole = draw(result(grid(4), about("a", "b")), tmp_path)[1]
+    whole = draw(result(grid(4), about("a", "b", metrics=["height"])), tmp_path)[1]
     before = pixels(whole)
-    draw(result(grid(4), about("a", "b"), lambda a, b: None if a == b == 3.0 else a + b), tmp_path)
+    draw(result(grid(4), about("a", "b", metrics=["height"]), lambda a, b: None if a == b == 3.0 else a + b), tmp_path)
     assert (np.abs(pixels(whole) - before).sum(axis=2) > 0).mean() > 0.01
 
 
