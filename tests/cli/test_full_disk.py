@@ -37,9 +37,7 @@ def compiled():
 
 @pytest.fixture
 def with_room(monkeypatch):
-    """Runs ``bilayer`` in this process, in which no file may meanwhile have more than so many bytes; exit code, standard
-    output and standard error.
-    """
+    """Runs ``bilayer`` in this process, where no file may meanwhile be longer; exit code and both outputs."""
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
 
     def run(size, *arguments):

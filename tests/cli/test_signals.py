@@ -54,7 +54,7 @@ def wait_for(condition, process=None):
     while not condition():
         assert process is None or process.poll() is None, process.communicate()
         assert time.monotonic() < deadline
-        time.sleep(0.002)
+        time.sleep(0.01)
 
 
 def catches(pid: int, number: int) -> bool:

@@ -97,8 +97,8 @@ def test_the_programs_of_the_readme_run(root, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     programs = [block for block in blocks(root / "README.md") if block.info == "python"]
     assert programs
-    for program in programs:
-        assert len(pasted(program, {})[1].splitlines()) >= 3
+    for block in programs:
+        assert len(pasted(block, {})[1].splitlines()) >= 3
 
 
 def test_pictures_are_small_and_each_is_shown_on_a_page(root):

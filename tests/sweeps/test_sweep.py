@@ -68,7 +68,7 @@ def test_scenes_and_tables_travel_with_the_runs(cluster, tmp_path, monkeypatch):
 
 
 def die_hog_or_hang(run):
-    """Never comes back, for the first run; dies the first time that it is called, or takes memory until it is killed."""
+    """Never comes back, for the first run; dies the first time that it is called, or takes memory without end."""
     mark = run.simulator.scene.title
     if run.parameters["damping"] == 0.0:
         time.sleep(1000.0)
