@@ -36,7 +36,7 @@ def nanoseconds_of(stamp: Time) -> int:
 
 def to_seconds(stamp: Time) -> float:
     """Time of a message [s]."""
-    return stamp.sec + stamp.nanosec / NANOSECONDS
+    return nanoseconds_of(stamp) / NANOSECONDS
 
 
 def status_without_run(message: str, name: str) -> DiagnosticArray:

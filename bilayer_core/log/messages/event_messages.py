@@ -31,4 +31,4 @@ def decode_event(data: bytes) -> Event:
         (length,) = struct.unpack_from("<I", data, place)
         texts.append(data[place + 4 : place + 3 + length].decode())
         place += 4 + length
-    return Event(seconds + rest / NANOSECONDS, level, *texts)
+    return Event((seconds * NANOSECONDS + rest) / NANOSECONDS, level, *texts)
