@@ -93,12 +93,15 @@ def test_the_notes_of_every_release_are_short(root):
 
 
 @pytest.mark.slow
-def test_the_programs_of_the_readme_run(root, tmp_path, monkeypatch):
+def test_the_readme_is_short_and_its_robot_commands_and_program_run(root, tmp_path, monkeypatch):
+    assert (root / "README.md").stat().st_size <= 6000
     monkeypatch.chdir(tmp_path)
-    programs = [block for block in blocks(root / "README.md") if block.info == "python"]
-    assert programs
-    for block in programs:
-        assert len(pasted(block, {})[1].splitlines()) >= 3
+    found = {block.info: block for block in blocks(root / "README.md")}
+    assert found["sh"].text.startswith("bilayer check curl.yaml")  # the last one
+    Path("curl.yaml").write_text(found["yaml"].text, encoding="utf-8")
+    code, told = pasted(found["sh"], {})
+    assert code == 0 and "no faults, no warnings" in told and Path("curl.png").stat().st_size > 10_000
+    assert len(pasted(found["python"], {})[1].splitlines()) >= 3
 
 
 def test_pictures_are_small_and_each_is_shown_on_a_page(root):

@@ -77,6 +77,6 @@ def test_no_name_of_a_parameter_is_the_prefix_of_another(table):
 
 
 @pytest.mark.parametrize("parameter", REPLAY_NODE, ids=lambda parameter: parameter.name)
-def test_the_readme_tells_every_parameter_of_the_player_with_its_default(root, parameter):
+def test_the_page_tells_every_parameter_of_the_player_with_its_default(root, parameter):
     default = {"": "empty"}.get(parameter.default, f"`{str(parameter.default).replace('False', 'false')}`")
-    assert f"\n| `{parameter.name}` | {default} | " in (root / "README.md").read_text(encoding="utf-8")
+    assert f"\n| `{parameter.name}` | {default} | " in (root / "docs/ros2.md").read_text(encoding="utf-8")
