@@ -110,7 +110,8 @@ def test_a_page_says_the_same_where_only_rounding_differs():
 
 def test_the_page_of_results_has_every_case_in_order_with_its_reference_and_limit(root):
     text = (root / "docs/validation.md").read_text(encoding="utf-8")
-    rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    lines = text.partition("## All cases")[2].splitlines()
+    rows = [line.strip("| ").split(" | ") for line in lines if line.startswith("| ")]
     written = [(row[0], row[1], row[5], row[6]) for row in rows if row[0] != "case"]
     present = [(case.name.split("/", 1)[1], case.against, f"{case.limit:g}", "pass") for case in case_register.CASES]
     assert written == present, "cases have changed; make the tables anew, as the page says"
