@@ -38,9 +38,9 @@ def wait_until(what, seconds=60.0):
 
 
 def end(processes):
-    """End programs, and wait for them."""
+    """End programs of Dask at once: a worker whose scheduler is busy may take long over its farewell."""
     for process in processes:
-        process.terminate()
+        process.kill()
     for process in processes:
         process.wait(60)
 
