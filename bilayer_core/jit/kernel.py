@@ -16,7 +16,7 @@ FASTMATH = {"contract", "reassoc", "nsz", "arcp"}
 EXACT = {"contract", "nsz"}
 """For sums whose rounding errors are kept: their terms must not be reordered."""
 PUBLIC = os.environ.get("BILAYER_JIT_PUBLIC", "0") != "0"
-"""Whether to do without what `compiler.undocumented` describes."""
+"""Switch that does without what `compiler.undocumented` describes."""
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"} | ({} if PUBLIC else {"_nrt": False})
 COMPILER = "bilayer_core.jit.compiler.machine_code"
 """Module that imports numba: for processes that compile something."""
