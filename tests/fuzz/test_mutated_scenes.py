@@ -1,6 +1,6 @@
 """Scenes with random mutations end with an answer of `check` or with a clear refusal, in time and with little memory.
 
-150 of them by default, the same ones every time. More, and others:
+500 of them by default, the same ones every time. More, and others:
 
     FUZZ_SCENES=10000 FUZZ_SEED=7 pytest -m "" tests/fuzz
 
@@ -24,7 +24,7 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from fuzz.cases import FAMILIES, Case
 from fuzz.worker import ACCEPTED, FAILED, REFUSED, Outcome, Unclear, Workers, limit_memory, require_clear
 
-SCENES = int(os.environ.get("FUZZ_SCENES", "150"))
+SCENES = int(os.environ.get("FUZZ_SCENES", "500"))
 SEED = int(os.environ.get("FUZZ_SEED", "1"))
 STEPS = os.environ.get("FUZZ_STEPS", "0") == "1"
 FAILURES = Path(os.environ.get("FUZZ_FAILURES") or Path(__file__).resolve().parents[2] / ".pytest_cache" / "fuzz")
