@@ -40,19 +40,7 @@ from __future__ import annotations
 
 from bilayer_core.engine.kinetic import kinetic_energy
 from bilayer_core.engine.laws import eigenstrain_of
-from bilayer_core.engine.powers import (
-    BY_FLOW,
-    DRIVEN,
-    LOSING,
-    LOST,
-    STRAINED,
-    SUPPLIED,
-    SUPPLYING,
-    TAKEN_UP,
-    TAKING_UP,
-    in_barriers,
-    write_forces_of_laws,
-)
+from bilayer_core.engine.powers import BY_FLOW, in_barriers, write_forces_of_laws
 from bilayer_core.forces.added_mass import fluid_momentum, move_fluid
 from bilayer_core.forces.inertia import second_moment_beyond
 from bilayer_core.forces.raised import inertia_off_curve
@@ -62,7 +50,6 @@ from bilayer_core.kinematics.copying import copy
 from bilayer_core.kinematics.vector import row
 from bilayer_core.model.force_list import Kind, kinds
 from bilayer_core.model.force_slots import NAMES, slot_of
-from bilayer_core.model.records.outcome import CONTACT_ERROR, FRACTION, GAINED
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Stage, StageInputs, StateArrays, Work
@@ -150,9 +137,9 @@ def open_account(p, state, stage, at):
 def begin_step_account(p, state, inputs, work, weight):
     """Begin with a step from a state; `weight` is that of the powers there [s]."""
     drives, work_done = p.drives, work.account
-    work_done[SUPPLIED], work_done[LOST] = weight * state.account[POWER_SUPPLIED], weight * state.account[POWER_LOST]
-    work_done[TAKEN_UP] = weight * state.account[POWER_BARRIER]
-    work_done[DRIVEN] = work_done[STRAINED] = 0.0
+    work_done.supplied, work_done.lost = weight * state.account[POWER_SUPPLIED], weight * state.account[POWER_LOST]
+    work_done.taken_up = weight * state.account[POWER_BARRIER]
+    work_done.driven, work_done.jumped = 0, False
     for i in range(work.start_strain.shape[0]):
         law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
         work.start_strain[i] = eigenstrain_of(state.transduction[i], law[0], law[1], law[2])
@@ -195,9 +182,9 @@ def _supply_by_jumps(p, state, inputs, work):
         moment = strands.joint_stiffness[j, 0] * stage.rest_joint[j, 0]
         work.start_force[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * moment
     for i in range(work.start_strain.shape[0]):
-        done[SUPPLIED] -= 0.5 * (state.law_force[i] + work.start_force[i]) * work.strain[i]
+        done.supplied -= 0.5 * (state.law_force[i] + work.start_force[i]) * work.strain[i]
         work.start_strain[i] += work.strain[i]
-    done[STRAINED] = 1.0
+    done.jumped = True
 
 
 @kernel
@@ -218,7 +205,7 @@ def _inertial(p, stage, at):
             energy += bodies.mass[f] * at.body_departure[f, i] ** 2
             for j in range(3):
                 energy += n[i, j] * a[j, i]
-    return 0.5 * energy / (stage.lengths[0] * stage.lengths[1])
+    return 0.5 * energy / (stage.length * stage.momentum_length)
 
 
 @kernel
@@ -228,7 +215,7 @@ def _after_last_correction(p, stage, at):
     With the gradient g there, Hδ = −g: the potential falls by −(1 − α/2) α g·δ if the part α of δ was gone, and what
     inertia does not have of that, V has, or forces of friction do.
     """
-    system, sums, part, slope = p.system, p.sums, p.outcome.figures[FRACTION], 0.0
+    system, sums, part, slope = p.system, p.sums, p.outcome.fraction, 0.0
     for j in range(system.step.shape[0]):
         slope += sums.gradient[j] * system.step[j]
     for f in range(p.bodies.mass.shape[0]):
@@ -241,39 +228,39 @@ def _after_last_correction(p, stage, at):
 def close_step_account(p, state, work, h, beyond, end):
     """Take the account of a step into that of a state, which is its end, at `end`; whether it makes too much energy."""
     account, done = state.account, work.account
-    p.outcome.figures[CONTACT_ERROR] = 0.0
+    p.outcome.contact_error = 0.0
     if account[OPEN] == 0.0:
         open_account(p, state, work.stage, end)
         return NONE
     write_forces_of_laws(p, end, work.stage, work.end_force)
-    grows, unsure = done[STRAINED] != 0.0, 0.0
-    by_powers, power = done[SUPPLIED], account[POWER_SUPPLIED]
+    grows, unsure = done.jumped, 0.0
+    by_powers, power = done.supplied, account[POWER_SUPPLIED]
     for i in range(work.start_strain.shape[0]):
         strained, mean = work.strain[i] - work.start_strain[i], work.mean_force[i] / h
         grows |= strained != 0.0
-        done[SUPPLIED] -= mean * strained
+        done.supplied -= mean * strained
         unsure -= (mean - 0.5 * (work.start_force[i] + work.end_force[i])) * strained
     copy(work.end_force, state.law_force)
     energy, barriers, scale = _energies(p, state, end)
-    missed = abs(barriers - account[IN_BARRIERS] - done[TAKEN_UP])
+    missed = abs(barriers - account[IN_BARRIERS] - done.taken_up)
     if not beyond:
         energy += _after_last_correction(p, work.stage, end)
-    gain = energy - account[ENERGY] - done[SUPPLIED]
+    gain = energy - account[ENERGY] - done.supplied
     account[ENERGY], account[IN_BARRIERS] = energy, barriers
-    account[POWER_SUPPLIED], account[POWER_LOST] = done[SUPPLYING], done[LOSING]
-    account[POWER_BARRIER] = done[TAKING_UP]
-    account[NUMERICAL] += gain + done[LOST]
+    account[POWER_SUPPLIED], account[POWER_LOST] = done.supplying, done.losing
+    account[POWER_BARRIER] = done.taking_up
+    account[NUMERICAL] += gain + done.lost
     account[FREE] += gain
     account[LARGEST] = max(account[LARGEST], scale)
     damping = p.sums.lost[RESTITUTION] if p.restitution.exists else 0.0
     missed += DAMPING_SHARE * h * abs(damping - account[POWER_DAMPING])
     account[POWER_DAMPING] = damping
-    p.outcome.figures[CONTACT_ERROR] = missed
-    if done[DRIVEN] != 0.0:
+    p.outcome.contact_error = missed
+    if done.driven != 0:
         account[LOWEST], account[MADE], account[UNSURE] = account[FREE], 0.0, 0.0
-        if done[DRIVEN] == BY_FLOW:
+        if done.driven == BY_FLOW:
             return NONE
-        gain -= abs(unsure + by_powers - 0.5 * h * (power + done[SUPPLYING]))
+        gain -= abs(unsure + by_powers - 0.5 * h * (power + done.supplying))
         return _too_much(p, gain, gain, LARGEST_STEP_GAIN * account[LARGEST], 0.0)
     made = (1.0 - FORGOTTEN) * account[MADE] + gain
     account[MADE] = max(made, 0.0)
@@ -291,5 +278,5 @@ def _too_much(p, made, gain, allowed, small):
     """Return NONE, SOME or MUCH for a step that gains `gain` [J], and with the steps before it `made` [J]."""
     if made <= allowed or gain <= small * allowed:
         return NONE
-    p.outcome.figures[GAINED] = made / allowed
+    p.outcome.gained = made / allowed
     return SOME if gain <= allowed and made <= MOST * allowed else MUCH

@@ -10,10 +10,10 @@ from bilayer_core.engine.actuation import Actuation
 from bilayer_core.engine.capacity import CapacityError
 from bilayer_core.engine.energy_account import open_account
 from bilayer_core.engine.error_norm import ErrorNorm
-from bilayer_core.engine.integrate import Clock, Integration, StepControl, clear, empty_counts, integrate
+from bilayer_core.engine.integrate import Clock, Counts, Failure, Integration, StepControl, clear, integrate
 from bilayer_core.engine.observables import Observables, observe
 from bilayer_core.engine.potential import add_forces, expand_to_unknowns
-from bilayer_core.engine.run_extrema import HEIGHT, LEAST_GAP, count_shape
+from bilayer_core.engine.run_extrema import count_shape
 from bilayer_core.engine.step import treat_state, write_rest_strains
 from bilayer_core.engine.step_outcome import FAILURES, IntegrationReport
 from bilayer_core.engine.storage import Storage, new_configuration, new_work
@@ -25,16 +25,6 @@ from bilayer_core.model.bend_faces import bend_faces
 from bilayer_core.model.contact_points import contact_point_names
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.contacts import RodContact, Surfaces
-from bilayer_core.model.records.outcome import (
-    CONFIGURATION,
-    FACTORISATIONS,
-    GAP,
-    ITERATIONS,
-    PAIR,
-    RESIDUAL,
-    SETTLINGS,
-    STATUS,
-)
 from bilayer_core.model.records.parts import Mechanisms
 from bilayer_core.model.records.problem import Sums
 from bilayer_core.model.records.step import RunExtrema, StageInputs, StateArrays
@@ -86,7 +76,8 @@ class Engine:
         self._inputs = new_inputs(model, sizes, max(len(used.points) for used in methods))
         self.stimulus = self._inputs.applied
         self.actuation: Actuation | None = None
-        self._error_norm, self._counts = error_norm_of(model), empty_counts()
+        self._error_norm, self._counts = error_norm_of(model), Counts()
+        self._failure = Failure()
         self._state: State | None = None
         self._integration: Integration | None = None
         self._no_joints = Joints.absent()
@@ -110,8 +101,9 @@ class Engine:
     def start_over(self, height: float) -> None:
         """Forget the extrema of the run; the mass centre is at `height` [m]."""
         extrema = self.extrema
-        extrema.figures[:] = 0.0
-        extrema.figures[HEIGHT], extrema.figures[LEAST_GAP] = height, math.inf
+        for name in extrema.changing:
+            setattr(extrema, name, 0.0)
+        extrema.height, extrema.least_gap = height, math.inf
         extrema.body_top[:] = -math.inf
         extrema.nodes[:], extrema.most_nodes[:], extrema.first_contact[:] = 0, 0, math.nan
 
@@ -121,22 +113,15 @@ class Engine:
         self._storage.set_friction(state.friction)
         clear(counts)
         done = integrate(self._parts_for(state), until, due, most, *self._newton)
-        status, pair = int(outcome.counts[STATUS]), int(outcome.counts[PAIR])
+        status, pair = outcome.status, outcome.pair
         if done > 0 or status in FAILURES:
             self._take_end()
             self._evaluated = False
-        iterations, factorisations, settlings, rejected, inaccurate, restarts, gaining, unresolved, regularised = (
-            counts.numbers.tolist()
-        )
-        shortest, longest, length = counts.lengths.tolist()
-        residual, largest_residual = counts.residuals.tolist()
-        error = 0.0
+        figures = {name: getattr(counts, name) for name in counts.names}
         if status in FAILURES:
-            length, residual, error, iterations = counts.failure.tolist()
-        return IntegrationReport(
-            *(done, status, pair, int(iterations), factorisations, settlings, residual, largest_residual),
-            *(shortest, longest, length, rejected, inaccurate, gaining, unresolved, restarts, error, regularised),
-        )
+            failure = self._failure
+            figures |= {name: getattr(failure, name) for name in failure.names}
+        return IntegrationReport(done, status, pair, **figures)
 
     def do_once(self, state: State, mode: int, length: float = 0.0, tolerance: float = math.inf) -> IntegrationReport:
         """Execute a request (`engine.request_modes`) on a state at rest, with the drive set; return a report."""
@@ -146,11 +131,11 @@ class Engine:
             status = treat_state(run.problem, run.state, run.work, mode, length, tolerance, self._newton[1])
             if not self.reserve(status, state):
                 break
-        counts, figures = self._outcome.counts.tolist(), self._outcome.figures
+        outcome = self._outcome
         self._take_end()
         self._evaluated = True
-        numbers = counts[ITERATIONS], counts[FACTORISATIONS], counts[SETTLINGS]
-        return IntegrationReport(1, status, counts[PAIR], *numbers, float(figures[RESIDUAL]))
+        numbers = outcome.iterations, outcome.factorisations, outcome.settlings
+        return IntegrationReport(1, status, outcome.pair, *numbers, outcome.residual)
 
     def _parts_for(self, state: State) -> Integration:
         """Return the record that compiled steps take; the same object as long as all its parts are the same."""
@@ -176,13 +161,14 @@ class Engine:
                 start_state=start_arrays,
                 extrema=self.extrema,
                 counts=self._counts,
+                failure=self._failure,
             )
         return parts
 
     def _take_end(self) -> None:
         """Note which configuration was evaluated last, and the smallest gap there."""
-        self.end = self._configurations[self._outcome.counts[CONFIGURATION]]
-        self.gap = float(self._outcome.figures[GAP])
+        self.end = self._configurations[self._outcome.configuration]
+        self.gap = self._outcome.gap
 
     def reserve(self, status: int, state: State) -> bool:
         """Have the capacity that a step from a state lacked; false if that is not what it lacked.

@@ -13,7 +13,6 @@ from bilayer_core.forces.friction_limit import limit_by_friction
 from bilayer_core.forces.rod_contact import find_rod_contacts
 from bilayer_core.forces.surface_pairs import list_surface_pairs
 from bilayer_core.jit import piece
-from bilayer_core.model.records.outcome import ENERGY, FRACTION, FRICTION_FRACTION, GAP, STATUS
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY, ROD_CAPACITY_EXCEEDED
 from bilayer_core.model.records.step import Configuration, Stage, StateArrays, Work
@@ -50,7 +49,7 @@ def evaluate_at(p, at, stage, with_hessian, expands):
             energy += p.sums.energy[k]
         if expands:
             expand_to_unknowns(p, at)
-    p.outcome.figures[ENERGY], p.outcome.figures[GAP] = energy, gap
+    p.outcome.energy, p.outcome.gap = energy, gap
     return status
 
 
@@ -69,7 +68,7 @@ def evaluate_laws(p, work, at):
 @piece(float, Problem, Stage)
 def speed_of_step(p, stage):
     """Largest displacement of a material point in the step in `System` over the length of the stage [m/s]."""
-    return correction_speed(p.strands, p.bodies, p.system, stage.lengths[0])
+    return correction_speed(p.strands, p.bodies, p.system, stage.length)
 
 
 @piece(int, Problem, Configuration, Stage)
@@ -86,5 +85,5 @@ def bound_step(p, at, stage):
     fraction = friction_fraction = bound(p, at)
     if p.slips.exists:
         friction_fraction = limit_by_friction(p, at, stage, slope, fraction)
-    p.outcome.figures[FRACTION], p.outcome.figures[FRICTION_FRACTION] = fraction, friction_fraction
-    return p.outcome.counts[STATUS]
+    p.outcome.fraction, p.outcome.friction_fraction = fraction, friction_fraction
+    return p.outcome.status

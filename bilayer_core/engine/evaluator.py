@@ -26,7 +26,6 @@ from bilayer_core.forces.elements import start_elements
 from bilayer_core.forces.force_register import memory_size
 from bilayer_core.model.force_slots import NAMES
 from bilayer_core.model.model import Model
-from bilayer_core.model.records.outcome import ENERGY, FRACTION, FRICTION_FRACTION, GAP, PAIR, SHIFT, SIMPLIFIED
 from bilayer_core.model.records.problem import Problem, Sums
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Point, Stage, StateArrays
@@ -170,7 +169,7 @@ class Evaluator:
             Turn of edges from the start of the step to `at` [rad], shape (n_edge,).
         """
         self.set_drive(rest_edge, rest_joint, load_factor)
-        self.stage.lengths[:] = lengths
+        self.stage.length, self.stage.momentum_length = lengths
         self._work.start_angle[:] = start_angle
         inputs = self._inputs
         inputs.position[0], inputs.rotation[0], inputs.rates[0] = at.pose_position[:-1], at.rotation[:-1], 0.0
@@ -185,7 +184,7 @@ class Evaluator:
         """
         self._take(state)
         self.set_drive(rest_edge, rest_joint, load_factor)
-        self.stage.lengths[:] = length
+        self.stage.length = self.stage.momentum_length = length
         stand_still_stage(self.problem, self._arrays, at, False, self.stage)
 
     def set_drive(self, rest_edge: Array, rest_joint: Array, load_factor: Array) -> None:
@@ -240,8 +239,8 @@ class Evaluator:
         self._select(at, forces)
         while (status := evaluate_at(self.problem, at, self.stage, second, expands)) != READY:
             self._grow(status)
-        figures, sums = self._storage.outcome.figures, self.sums
-        self.total, self.gap = float(figures[ENERGY]), float(figures[GAP])
+        outcome, sums = self._storage.outcome, self.sums
+        self.total, self.gap = outcome.energy, outcome.gap
         return {name: float(sums.energy[k]) for k, name in enumerate(NAMES) if sums.selected[k]}
 
     def forces_of_laws(self, at: Configuration) -> Array:
@@ -264,7 +263,8 @@ class Evaluator:
 
         None of them has the coupling of two edges by contacts of rods, see `newton_step`.
         """
-        problem, size, (length, momentum_length) = self.problem, self.model.solved_layout.size, self.stage.lengths
+        problem, size = self.problem, self.model.solved_layout.size
+        length, momentum_length = self.stage.length, self.stage.momentum_length
         selected = {name for k, name in enumerate(NAMES) if self.sums.selected[k]}
         factor = "inertia" in selected and 1.0 / (length * momentum_length)
         factor += "damping" in selected and problem.damping / length
@@ -292,8 +292,8 @@ class Evaluator:
         while (status := factorise(self.problem, at, self.stage, False)) != READY:
             self._grow(status)
             self.evaluate(at, second=True)
-        figures = self._storage.outcome.figures
-        return float(figures[SHIFT]), int(figures[SIMPLIFIED])
+        outcome = self._storage.outcome
+        return outcome.shift, outcome.simplified
 
     def newton_step(self, gradient: Array, body_gradient: Array) -> tuple[Array, Array]:
         """Minus the inverse of the factorised matrix times a gradient: of unknowns, shape (size,), and of free bodies,
@@ -320,5 +320,4 @@ class Evaluator:
         count = int(problem.sliding.count[0]) if problem.sliding.exists else 0
         count += int(problem.rod_contact.sliding.count[0]) if problem.rod_contact.exists else 0
         slip = problem.slips.path[:count].copy() if problem.slips.exists else np.zeros((0, 0))
-        figures = outcome.figures
-        return StepBound(float(figures[FRACTION]), int(outcome.counts[PAIR]), float(figures[FRICTION_FRACTION]), slip)
+        return StepBound(outcome.fraction, outcome.pair, outcome.friction_fraction, slip)

@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from bilayer_core.engine.actuation import (
     Actuation,
     corner_after,
@@ -34,23 +32,8 @@ from bilayer_core.engine.step_size import (
     next_end,
 )
 from bilayer_core.jit import kernel, piece, record_at
-from bilayer_core.jit.record import Indices, Vector, record
+from bilayer_core.jit.record import CHANGES, Vector, record
 from bilayer_core.kinematics.copying import copy
-from bilayer_core.model.records.outcome import (
-    CONFIGURATION,
-    CONTACT_ERROR,
-    FACTORISATIONS,
-    GAINED,
-    GAINS,
-    GAP,
-    ITERATIONS,
-    LIGHT_ERROR,
-    PAIR,
-    REGULARISED,
-    RESIDUAL,
-    SETTLINGS,
-    STATUS,
-)
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import CONVERGED, GAINS_ENERGY, INPUTS_END, MAX_ITERATIONS, READY, TOO_INACCURATE
 from bilayer_core.model.records.step import Configuration, Method, RunExtrema, StageInputs, StateArrays, Work
@@ -91,15 +74,32 @@ class StepControl:
 
 @record
 class Counts:
-    """Counts and figures of steps, added up until they are cleared."""
+    """Counts and figures of steps, added up until they are cleared; see `engine.step_outcome.IntegrationReport`."""
 
-    numbers: (
-        Indices  # iterations, factorisations, settlings, attempts refused, of these for errors, restarts, for energy;
-        # steps that do not resolve their contact, matrices that were regularised
-    )
-    lengths: Vector  # shortest, longest, and last step [s]
-    residuals: Vector  # of the last step, and the largest [m/s]
-    failure: Vector  # last length [s], residual [m/s], error (or energy made) over what is allowed, iterations
+    iterations: int = CHANGES
+    factorisations: int = CHANGES
+    settlings: int = CHANGES
+    rejected: int = CHANGES
+    inaccurate: int = CHANGES
+    gaining: int = CHANGES
+    unresolved: int = CHANGES
+    restarts: int = CHANGES
+    regularised: int = CHANGES
+    shortest: float = CHANGES
+    longest: float = CHANGES
+    length: float = CHANGES
+    residual: float = CHANGES
+    largest_residual: float = CHANGES
+
+
+@record
+class Failure:
+    """Figures of the last attempt at a step that failed; see `engine.step_outcome.IntegrationReport`."""
+
+    length: float = CHANGES
+    residual: float = CHANGES
+    error: float = CHANGES
+    iterations: int = CHANGES
 
 
 @record
@@ -119,18 +119,14 @@ class Integration:
     start_state: StateArrays  # at the start of the step
     extrema: RunExtrema
     counts: Counts
-
-
-def empty_counts() -> Counts:
-    """Return the counts of no steps."""
-    return Counts(numbers=np.zeros(9, dtype=np.int64), lengths=np.zeros(3), residuals=np.zeros(2), failure=np.zeros(4))
+    failure: Failure
 
 
 def clear(counts: Counts) -> None:
     """Begin again to count."""
-    for name in Counts.names:
-        getattr(counts, name)[:] = 0
-    counts.lengths[0] = math.inf
+    for name in counts.names:
+        setattr(counts, name, 0)
+    counts.shortest = math.inf
 
 
 @kernel
@@ -215,8 +211,8 @@ def _plan(control, clock, h, planned, error, iterations, shortened):
 def _leave(run, done, status, pair, end, gap):
     """Note how steps ended."""
     outcome = run.problem.outcome
-    outcome.counts[STATUS], outcome.counts[PAIR], outcome.counts[CONFIGURATION] = status, pair, end
-    outcome.figures[GAP] = gap
+    outcome.status, outcome.pair, outcome.configuration = status, pair, end
+    outcome.gap = gap
     return done
 
 
@@ -245,8 +241,7 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
         `INPUTS_END`: the actuation is to be continued from the present time.
     """
     p, state, work, clock, control, counts = run.problem, run.state, run.work, run.clock, run.control, run.counts
-    start_state, inputs, numbers, lengths = run.start_state, run.inputs, run.counts.numbers, run.counts.lengths
-    found, figures, fixed = p.outcome.counts, p.outcome.figures, run.control.dt > 0.0
+    start_state, inputs, outcome, fixed = run.start_state, run.inputs, p.outcome, run.control.dt > 0.0
     status, pair, end, gap = READY, -1, 1, math.inf
     for k in range(most):
         begin = clock.time[0]
@@ -275,53 +270,53 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
             status = make_step(
                 p, state, start_state, method, run.method.history, inputs, work, h, newton_tolerance, max_iterations
             )
-            pair, end, iterations = found[PAIR], found[CONFIGURATION], found[ITERATIONS]
-            residual, gap = figures[RESIDUAL], figures[GAP]
+            pair, end, iterations = outcome.pair, outcome.configuration, outcome.iterations
+            residual, gap = outcome.residual, outcome.gap
             if status != CONVERGED and status < MAX_ITERATIONS:
                 return _leave(run, k, status, pair, end, gap)
-            numbers[0] += iterations
-            numbers[1] += found[FACTORISATIONS]
-            numbers[2] += found[SETTLINGS]
-            numbers[8] += found[REGULARISED]
+            counts.iterations += iterations
+            counts.factorisations += outcome.factorisations
+            counts.settlings += outcome.settlings
+            counts.regularised += outcome.regularised
             error, of_contact = math.inf, 0.0
             if status == CONVERGED:
                 error = 0.0
                 if not fixed:
                     defect = step_defect(run.error_norm, start_state, state, h)
-                    error = max(method.estimate * defect, figures[LIGHT_ERROR]) / control.tolerance
-                    of_contact = figures[CONTACT_ERROR] / (CONTACT_SHARE * state.account[LARGEST] * control.tolerance)
-                gains = found[GAINS]
+                    error = max(method.estimate * defect, outcome.light_error) / control.tolerance
+                    of_contact = outcome.contact_error / (CONTACT_SHARE * state.account[LARGEST] * control.tolerance)
+                gains = outcome.gains
                 if gains == SOME and h <= GROWTH_LIMIT * shortest:
                     shortest = _shortest(run, begin)
                     gains = NONE if h <= GROWTH_LIMIT * shortest else SOME  # rounding, or what Newton left
                 if error <= 1.0 and gains == NONE and (of_contact <= 1.0 or h <= GROWTH_LIMIT * control.shortest):
-                    numbers[7] += of_contact > 1.0
+                    counts.unresolved += of_contact > 1.0
                     break
                 status = GAINS_ENERGY if error <= 1.0 and gains != NONE else TOO_INACCURATE
-                error = figures[GAINED] if status == GAINS_ENERGY else max(error, of_contact)
+                error = outcome.gained if status == GAINS_ENERGY else max(error, of_contact)
             if h <= GROWTH_LIMIT * shortest:
                 shortest = _shortest(run, begin)
             if status >= TOO_INACCURATE:
                 copy(start_state.values, state.values)
             if h <= GROWTH_LIMIT * shortest:
-                counts.failure[0], counts.failure[1], counts.failure[2] = h, residual, error
-                counts.failure[3] = iterations
+                failure = run.failure
+                failure.length, failure.residual, failure.error, failure.iterations = h, residual, error, iterations
                 return _leave(run, k, status, pair, end, gap)
             rejected += 1
-            numbers[3] += 1
+            counts.rejected += 1
             if status == GAINS_ENERGY:
-                numbers[6] += 1
+                counts.gaining += 1
                 if run.method.history:  # what it remembers does not get better with shorter steps
                     method, starts = run.starter, True
             if status == TOO_INACCURATE:
-                numbers[4] += 1
+                counts.inaccurate += 1
                 h = after_rejection(control.order, h, error)
             else:
                 h = FAILURE_FACTOR * h
             h = max(h, shortest)
-        numbers[5] += starts
-        lengths[0], lengths[1], lengths[2] = min(lengths[0], h), max(lengths[1], h), h
-        counts.residuals[0], counts.residuals[1] = residual, max(counts.residuals[1], residual)
+        counts.restarts += starts
+        counts.shortest, counts.longest, counts.length = min(counts.shortest, h), max(counts.longest, h), h
+        counts.residual, counts.largest_residual = residual, max(counts.largest_residual, residual)
         _plan(control, clock, h, planned, error, iterations / method.couplings.shape[1], rejected > 0)
         for c in range(inputs.applied.shape[0]):
             inputs.applied[c] = inputs.stimulus[method.nodes.shape[0] - 1, c]

@@ -28,17 +28,6 @@ from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.record import Matrix, Stack
 from bilayer_core.kinematics.copying import copy
 from bilayer_core.kinematics.rotating import compose_quaternion, rotate_by, rotation_vector_between
-from bilayer_core.model.records.outcome import (
-    FACTORISATIONS,
-    FRACTION,
-    GAP,
-    ITERATIONS,
-    PAIR,
-    RESIDUAL,
-    SETTLINGS,
-    STATUS,
-    SWAPPED,
-)
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import (
     BLOCKED,
@@ -118,16 +107,16 @@ def bound(p, at):
     near pair that sets it (−1: none), and whether that could be found, are left in `Outcome`.
     """
     _move_constrained(p.constrained, p.system, at)
-    counts = p.outcome.counts
-    counts[PAIR], counts[STATUS] = -1, READY
+    outcome = p.outcome
+    outcome.pair, outcome.status = -1, READY
     fraction = 1.0
     if p.surfaces.exists:
         fraction = bound_at_surfaces(p, at)
-    if counts[STATUS] != READY or not p.rod_contact.exists:
+    if outcome.status != READY or not p.rod_contact.exists:
         return fraction
     between = bound_between_rods(p, at)
     if between < fraction:
-        counts[PAIR] = -1
+        outcome.pair = -1
         return between
     return fraction
 
@@ -169,7 +158,7 @@ def first_guess_of(p, start, position, rotation, stage, guess, whole):
     bodies, system = p.bodies, p.system
     free = bodies.mass.shape[0]
     _move_prescribed(bodies, start, position, rotation, system.motion)
-    fraction, counts = 1.0, p.outcome.counts
+    fraction, outcome = 1.0, p.outcome
     for attempt in range(3):
         for f in range(free):
             b = bodies.body_of_free[f]
@@ -182,9 +171,9 @@ def first_guess_of(p, start, position, rotation, stage, guess, whole):
         for k in range(p.strands.edge_count):
             system.angle_step[k] = fraction * stage.predicted_angle[k]
         alpha = bound(p, start)
-        if counts[STATUS] != READY:
-            counts[PAIR] = -1
-            return counts[STATUS]
+        if outcome.status != READY:
+            outcome.pair = -1
+            return outcome.status
         if alpha >= 1.0:
             break
         if attempt == 2 or whole:
@@ -226,7 +215,7 @@ def first_guess_of(p, start, position, rotation, stage, guess, whole):
     transport_frames(p, start, guess)
     for k in range(stage.twist.shape[0]):
         guess.joint_strain[k, 2] = stage.twist[k]
-    counts[PAIR] = -1
+    outcome.pair = -1
     return READY
 
 
@@ -256,7 +245,7 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
         In `Outcome`: whether the minimum is `trial` and not `at`, numbers of iterations, factorisations and settlings,
         the speed of the last correction [m/s], and the smallest gap to a surface or another rod [m].
     """
-    counts, figures = p.outcome.counts, p.outcome.figures
+    outcome = p.outcome
     update_lagged(p, at, stage)
     swapped, fresh, short, task = False, True, False, FACTORISE
     settled = False  # whether what is left to do is the last correction
@@ -319,12 +308,12 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
                 iterations += 1
                 fresh = True
         solve(p)
-        residual = correction_speed(p.strands, p.bodies, p.system, stage.lengths[0])
+        residual = correction_speed(p.strands, p.bodies, p.system, stage.length)
         if not math.isfinite(residual):
             status = NOT_FINITE
             break
         enough = SETTLED_WITHIN * tolerance if checked else tolerance
-        settled = residual <= enough or residual <= rounding_speed(at, stage.lengths[0])
+        settled = residual <= enough or residual <= rounding_speed(at, stage.length)
         if settled and not checked:
             checked = True
             if settle_forces(p, at, stage):
@@ -340,21 +329,21 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
         if not settled and not fresh and residual > KEEP_FACTOR_BELOW * previous:
             task = FACTORISE
             continue
-        farthest = residual * stage.lengths[0] * (p.surfaces.arm_factor if p.surfaces.exists else 1.0)
+        farthest = residual * stage.length * (p.surfaces.arm_factor if p.surfaces.exists else 1.0)
         if settled and 2.0 * farthest <= SAFE_PART * min(gap, _least_gap_of_rods(p.rod_contact)):
             alpha, halvings, task = 1.0, 0, SEARCH  # two points that move towards each other keep a gap
             continue
         slope, noise = predicted_decrease(p.strands, p.bodies, p.sums, p.system)
         alpha = bound(p, at)
-        status = counts[STATUS]
+        status = outcome.status
         if status != READY:
             break
         halvings, task = 0, SEARCH
         if fresh and not settled and p.slips.exists:
             alpha = limit_by_friction(p, at, stage, slope, alpha)
         short = alpha < 1.0
-    counts[SWAPPED], counts[ITERATIONS], counts[FACTORISATIONS] = swapped, iterations, factorisations
-    counts[SETTLINGS], figures[RESIDUAL], figures[GAP], figures[FRACTION] = settlings, residual, gap, alpha
+    outcome.swapped, outcome.iterations, outcome.factorisations = swapped, iterations, factorisations
+    outcome.settlings, outcome.residual, outcome.gap, outcome.fraction = settlings, residual, gap, alpha
     return status
 
 

@@ -16,11 +16,7 @@ from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, StageInputs, Work
 
-SUPPLIED, LOST, TAKEN_UP, SUPPLYING, LOSING, TAKING_UP, DRIVEN, STRAINED = range(8)
-"""Slots of `Work.account`: what a step supplies, loses, and has barriers take up [J], the powers at its last stage
-[W], whether bodies, a flow or followers drive it, and whether a stimulus has jumped.
-"""
-BY_BODIES, BY_FLOW = 1.0, 2.0
+BY_BODIES, BY_FLOW = 1, 2
 """What drives a step: prescribed bodies alone, or a flow or followers too, of which T + V has no lowest value."""
 BARRIER, ROD_BARRIER = map(slot_of, ("barrier", "rod barrier"))
 
@@ -187,19 +183,19 @@ def add_powers(p, work, inputs, n, weight, at):
         supplied += sums.supplied[k]
         lost += sums.lost[k]
     _write_rates(p.bodies, inputs, n, at, work.end, work.rates)
-    done[TAKING_UP] = _power_of_barriers(p, at, work.end, work.rates) if in_barriers(p) != 0.0 else 0.0
-    done[TAKEN_UP] += weight * done[TAKING_UP]
+    done.taking_up = _power_of_barriers(p, at, work.end, work.rates) if in_barriers(p) != 0.0 else 0.0
+    done.taken_up += weight * done.taking_up
     driven = p.followers.exists or p.moments.exists
     if flow.exists:
         driven |= flow.velocity[0] != 0.0 or flow.velocity[1] != 0.0 or flow.velocity[2] != 0.0
     if driven:
-        done[DRIVEN] = BY_FLOW
+        done.driven = BY_FLOW
     if _moves(p.bodies.prescribed, work.rates):
-        done[DRIVEN] = max(done[DRIVEN], BY_BODIES)
+        done.driven = max(done.driven, BY_BODIES)
         supplied += _power_of_prescribed(p, at, work.rates)
-    done[SUPPLYING], done[LOSING] = supplied, lost
-    done[SUPPLIED] += weight * supplied
-    done[LOST] += weight * lost
+    done.supplying, done.losing = supplied, lost
+    done.supplied += weight * supplied
+    done.lost += weight * lost
     write_forces_of_laws(p, at, work.stage, work.end_force)
     for i in range(work.mean_force.shape[0]):
         work.mean_force[i] += weight * work.end_force[i]

@@ -8,15 +8,11 @@ from __future__ import annotations
 
 import math
 
-from bilayer_core.engine.powers import LOST, SUPPLIED
 from bilayer_core.forces.bend_twist import bending_strain
 from bilayer_core.jit import kernel, piece
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, RunExtrema, Stage, StateArrays, Work
-
-HEIGHT, LEAST_GAP, CONTACT_FORCE, CURVATURE, STRAIN, FIBRE_STRAIN, CURVATURE_BY_THICKNESS, PUT_IN, TAKEN_OUT = range(9)
-"""Slots of `RunExtrema.figures`."""
 
 
 @kernel
@@ -39,20 +35,20 @@ def _strain_about(strands, stage, at, j):
 @piece(int, Problem, StateArrays, Configuration, Stage, RunExtrema)
 def count_shape(p, state, at, stage, extrema):
     """Take the shape of a state, which is `at`, into the extrema: curvature, strain, and heights of bodies."""
-    strands, figures, voronoi = p.strands, extrema.figures, extrema.voronoi_length
+    strands, voronoi = p.strands, extrema.voronoi_length
     for j in range(voronoi.shape[0]):
         bend = bending_strain(at, strands.joint_a[j], strands.joint_b[j])
         curvature = abs(bend) / voronoi[j]
-        figures[CURVATURE] = max(figures[CURVATURE], curvature)
-        figures[CURVATURE_BY_THICKNESS] = max(figures[CURVATURE_BY_THICKNESS], curvature * extrema.thickness[j])
+        extrema.curvature = max(extrema.curvature, curvature)
+        extrema.curvature_by_thickness = max(extrema.curvature_by_thickness, curvature * extrema.thickness[j])
         rest = p.off_axis.rest[j, 0] if p.off_axis.exists else stage.rest_joint[j, 0]
         stretch = _strain_about(p.strands, stage, at, j)
         for f in range(2):
             strain = abs(stretch - extrema.faces[j, f] * (bend - rest) / voronoi[j])
-            figures[FIBRE_STRAIN] = max(figures[FIBRE_STRAIN], strain)
+            extrema.fibre_strain = max(extrema.fibre_strain, strain)
     for e in range(strands.edge_count):
         strain = abs(_strain(strands, stage, at, e))
-        figures[STRAIN], figures[FIBRE_STRAIN] = max(figures[STRAIN], strain), max(figures[FIBRE_STRAIN], strain)
+        extrema.strain, extrema.fibre_strain = max(extrema.strain, strain), max(extrema.fibre_strain, strain)
     for b in range(extrema.body_top.shape[0]):
         extrema.body_top[b] = max(extrema.body_top[b], state.body_position[b, 2])
     return READY
@@ -63,7 +59,7 @@ def count_end(p, state, at, work, gap, time, extrema):
     """Take the end of a step into the extrema: the smallest gap there [m] and the time [s] are given. What the step
     supplied and lost is added to the energy that went through.
     """
-    strands, figures, nodes = p.strands, extrema.figures, p.strands.node_mass.shape[0]
+    strands, nodes = p.strands, p.strands.node_mass.shape[0]
     height = largest = 0.0
     for i in range(nodes):
         height += strands.node_mass[i] * state.position[i, 2]
@@ -73,10 +69,10 @@ def count_end(p, state, at, work, gap, time, extrema):
     for r in range(raised.edge.shape[0]):
         moment = raised.first_moment[r, 0] + raised.first_moment[r, 1]
         height += moment * state.director1[raised.edge[r], 2]
-    figures[HEIGHT], figures[LEAST_GAP] = max(figures[HEIGHT], height / extrema.mass), min(figures[LEAST_GAP], gap)
-    figures[CONTACT_FORCE] = max(figures[CONTACT_FORCE], math.sqrt(largest))
-    figures[PUT_IN] += abs(work.account[SUPPLIED])
-    figures[TAKEN_OUT] += abs(work.account[LOST])
+    extrema.height, extrema.least_gap = max(extrema.height, height / extrema.mass), min(extrema.least_gap, gap)
+    extrema.contact_force = max(extrema.contact_force, math.sqrt(largest))
+    extrema.put_in += abs(work.account.supplied)
+    extrema.taken_out += abs(work.account.lost)
     _count_contacts(p.surfaces, time, extrema)
     return count_shape(p, state, at, work.stage, extrema)
 

@@ -172,7 +172,7 @@ def predict_stage(p, state, work, inputs, n, previous, start):
     """
     origin, stage, bodies = work.origin, work.stage, p.bodies
     position, rotation, rates = inputs.position[n], inputs.rotation[n], inputs.rates[n]
-    length = stage.lengths[0]
+    length = stage.length
     for b in range(origin.rotation.shape[0]):
         f = bodies.free_index[b]
         if f < 0:
@@ -265,7 +265,7 @@ def stand_still_stage(p, state, start, with_fluid, stage):
     Forces see velocities as displacements from an origin. `with_fluid` says whether inertia of the fluid wants the
     fluid's momentum at `start` with these velocities to stay, too, instead of asking for nothing.
     """
-    bodies, length = p.bodies, stage.lengths[0]
+    bodies, length = p.bodies, stage.length
     for b in range(state.body_position.shape[0]):
         w0, w1, w2 = row(state.body_angular_velocity, b)
         for c in range(3):
@@ -312,7 +312,7 @@ def _set_back(rotation, b, length, w0, w1, w2, out, c):
 
 @kernel
 def _origin_of_constrained(constrained, origin, state, stage):
-    length = stage.lengths[0]
+    length = stage.length
     for k in range(constrained.node.shape[0]):
         b, i, f = constrained.body[k], constrained.node[k], constrained.free[k]
         for c in range(3):

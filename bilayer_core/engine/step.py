@@ -40,19 +40,6 @@ from bilayer_core.engine.step_ends import (
 )
 from bilayer_core.jit import kernel, piece, record_at
 from bilayer_core.kinematics.copying import copy
-from bilayer_core.model.records.outcome import (
-    CONFIGURATION,
-    FACTORISATIONS,
-    GAINS,
-    GAP,
-    ITERATIONS,
-    LIGHT_ERROR,
-    PAIR,
-    REGULARISED,
-    RESIDUAL,
-    SETTLINGS,
-    SWAPPED,
-)
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import BEYOND, BLOCKED, COLLAPSED, CONVERGED, CROSSED, MAX_ITERATIONS, READY
 from bilayer_core.model.records.step import Configuration, Method, StageInputs, StateArrays, Work
@@ -124,9 +111,8 @@ def write_rest_strains(p, state, work):
 @kernel
 def _clear(outcome):
     """Begin to count what Newton's method needs."""
-    counts, figures = outcome.counts, outcome.figures
-    counts[ITERATIONS] = counts[FACTORISATIONS] = counts[SETTLINGS] = counts[REGULARISED] = 0
-    figures[RESIDUAL], figures[GAP] = 0.0, math.inf
+    outcome.iterations = outcome.factorisations = outcome.settlings = outcome.regularised = 0
+    outcome.residual, outcome.gap = 0.0, math.inf
 
 
 @kernel
@@ -134,15 +120,15 @@ def _solve(p, work, at, scratch, tolerance, max_iterations, wanted):
     """Let Newton's method do what is `wanted` from configuration number `at` on; its status, and the numbers of the
     configuration where it ended and of the other one. What it needed is added to `Outcome`.
     """
-    counts = p.outcome.counts
-    before = counts[ITERATIONS], counts[FACTORISATIONS], counts[SETTLINGS]
+    outcome = p.outcome
+    before = outcome.iterations, outcome.factorisations, outcome.settlings
     first, second = configuration_at(work.configurations[at]), configuration_at(work.configurations[scratch])
     arguments = p, first, second, work.stage, tolerance, max_iterations, wanted
     status = minimise_potential(*arguments)
-    counts[ITERATIONS] += before[0]
-    counts[FACTORISATIONS] += before[1]
-    counts[SETTLINGS] += before[2]
-    if counts[SWAPPED]:
+    outcome.iterations += before[0]
+    outcome.factorisations += before[1]
+    outcome.settlings += before[2]
+    if outcome.swapped:
         return status, scratch, at
     return status, at, scratch
 
@@ -150,7 +136,7 @@ def _solve(p, work, at, scratch, tolerance, max_iterations, wanted):
 @kernel
 def _leave(p, status, pair, end):
     """Note the near pair that blocks motion, −1 without one, and the number of the last configuration."""
-    p.outcome.counts[PAIR], p.outcome.counts[CONFIGURATION] = pair, end
+    p.outcome.pair, p.outcome.configuration = pair, end
     return status
 
 
@@ -184,7 +170,7 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
         in `work.configurations` of the last configuration, numbers of iterations, factorisations and settlings, the
         largest residual and the gap.
     """
-    stage, previous, figures = work.stage, work.first, p.outcome.figures
+    stage, previous, outcome = work.stage, work.first, p.outcome
     s, e, t = 0, 1, 2
     ends, stages = method.couplings.shape
     _clear(p.outcome)
@@ -195,7 +181,7 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
     begin_step_account(p, state, inputs, work, method.works[0] * h)
     if p.light.exists:
         begin_light(p, state)
-    stage.lengths[0], stage.lengths[1] = method.diagonal * h, method.momentum_diagonal * h
+    stage.length, stage.momentum_length = method.diagonal * h, method.momentum_diagonal * h
     work.start_angle[:] = 0.0
     worst = 0.0
     for n in range(stages):
@@ -210,12 +196,12 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
             return _leave(p, status, -1, e)
         status = first_guess_of(p, start, inputs.position[n], inputs.rotation[n], stage, guess, False)
         if status != READY:
-            figures[RESIDUAL] = math.inf
-            return _leave(p, status, p.outcome.counts[PAIR], e)
+            outcome.residual = math.inf
+            return _leave(p, status, p.outcome.pair, e)
         status, e, t = _solve(p, work, e, t, tolerance, max_iterations, MINIMUM)
         if status != CONVERGED:
             return _leave(p, status, -1, e)
-        worst = max(worst, figures[RESIDUAL])
+        worst = max(worst, outcome.residual)
         solved = configuration_at(work.configurations[e])
         end_stage(p, state, work, inputs, n, solved)
         add_powers(p, work, inputs, n, method.works[1 + n] * h, solved)
@@ -227,13 +213,13 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
     if ends > stages:
         status, e = _end_beyond(p, state, start_state, method, inputs, work, s, e)
         if status != READY:
-            figures[RESIDUAL] = math.inf
+            outcome.residual = math.inf
             return _leave(p, status, -1, e)
     else:
         end = configuration_at(work.configurations[e])
         write_end(p, state, work.end, end, inputs, stages - 1)
         if with_history:  # for the step after, which can take them if nothing touches anew
-            keep_stage_derivatives(state, work.origin, work.end, stage.lengths[1], method.carry)
+            keep_stage_derivatives(state, work.origin, work.end, stage.momentum_length, method.carry)
             if not method.history:  # a first step may begin with velocities, but with no rates of strains
                 _forget_rates(p.raised, state.strain_acceleration)
             state.has_history[0] = _compare_touched(p.sums, state.touched)
@@ -241,24 +227,24 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
     edge = _collapsed(p.strands, configuration_at(work.configurations[e]))
     if edge >= 0:
         copy(start_state.values, state.values)
-        figures[RESIDUAL] = math.inf
+        outcome.residual = math.inf
         return _leave(p, COLLAPSED, edge, e)
     if p.surfaces.exists:
         crossed = crossing(p.strands, p.surfaces, configuration_at(work.configurations[e]))
         if crossed >= 0:
             copy(start_state.values, state.values)
-            figures[RESIDUAL] = math.inf
+            outcome.residual = math.inf
             return _leave(p, CROSSED, crossed, e)
     status = end_forces(p, configuration_at(work.configurations[e]), stage)
     copy(p.memory, state.memory)
     if status != READY:
         copy(start_state.values, state.values)
         return _leave(p, status, -1, e)
-    figures[RESIDUAL], figures[LIGHT_ERROR] = worst, 0.0
+    outcome.residual, outcome.light_error = worst, 0.0
     if p.light.exists:
-        figures[LIGHT_ERROR] = end_light(p, state, inputs, ends - 1, h)
+        outcome.light_error = end_light(p, state, inputs, ends - 1, h)
     last = configuration_at(work.configurations[e])
-    p.outcome.counts[GAINS] = close_step_account(p, state, work, h, ends > stages, last)
+    p.outcome.gains = close_step_account(p, state, work, h, ends > stages, last)
     return _leave(p, CONVERGED, -1, e)
 
 
@@ -293,7 +279,7 @@ def _end_beyond(p, state, start_state, method, inputs, work, s, e):
         return BEYOND if status == BLOCKED else status, e
     write_end(p, state, work.origin, end, inputs, n)
     end.total_angle[:] = 0.0
-    stage.lengths[:] = EVALUATION_TIME
+    stage.length = stage.momentum_length = EVALUATION_TIME
     status, e = _evaluate_at_rest(p, state, work, e, s, False)
     finite = 0.0
     for k in range(p.sums.energy.shape[0]):
@@ -356,12 +342,12 @@ def treat_state(p, state, work, mode, length, tolerance, max_iterations):
             length = EVALUATION_TIME
         elif length == 0.0:
             length = WITHOUT_INERTIA
-        stage.lengths[:] = length
+        stage.length = stage.momentum_length = length
         status, e = _evaluate_at_rest(p, state, work, s, t, mode == COUNT)
         return _leave(p, status, -1, e)
     if p.surfaces.exists:
         note_start(p.surfaces, start)
-    stage.lengths[:] = length
+    stage.length = stage.momentum_length = length
     stand_still_stage(p, state, start, True, stage)
     stage.still[0] = 1.0
     status = start_stage(p, start, stage)
@@ -369,14 +355,14 @@ def treat_state(p, state, work, mode, length, tolerance, max_iterations):
         return _leave(p, status, -1, e)
     status = first_guess_of(p, start, state.body_position, state.body_rotation, stage, guess, False)
     if status != READY:
-        p.outcome.figures[RESIDUAL] = math.inf
-        return _leave(p, status, p.outcome.counts[PAIR], e)
+        p.outcome.residual = math.inf
+        return _leave(p, status, p.outcome.pair, e)
     status, e, t = _solve(p, work, e, t, tolerance, max_iterations, MINIMUM)
     if status == CONVERGED or status == MAX_ITERATIONS:
         end = configuration_at(work.configurations[e])
         crossed = crossing(p.strands, p.surfaces, end) if p.surfaces.exists else -1
         if crossed >= 0:
-            p.outcome.figures[RESIDUAL] = math.inf
+            p.outcome.residual = math.inf
             return _leave(p, CROSSED, crossed, e)
         work.moved[0] = distance(p, start, end)
         write_shape(p, end, state)

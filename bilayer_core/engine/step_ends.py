@@ -37,7 +37,7 @@ def end_stage(p, state, work, inputs, n, end):
     Velocities and displacements are those of inertia's motion plus the departure of the end from it.
     """
     origin, point, stage, bodies = work.origin, work.end, work.stage, p.bodies
-    position, rotation, length = inputs.position[n], inputs.rotation[n], stage.lengths[0]
+    position, rotation, length = inputs.position[n], inputs.rotation[n], stage.length
     for b in range(point.rotation.shape[0]):
         f = bodies.free_index[b]
         if f < 0:

@@ -26,11 +26,10 @@ from bilayer_core.forces.mechanisms import mechanisms_record
 from bilayer_core.jit import shapes_of, zeros_in_one
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.contacts import ContactColumns, RodContact, RodContactList, Sliding, Slips, Surfaces
-from bilayer_core.model.records.outcome import COUNTS, FIGURES
 from bilayer_core.model.records.parts import Plane, Space
 from bilayer_core.model.records.problem import BorderedSystem, Outcome, Problem, Sums
 from bilayer_core.model.records.status import BORDER_CAPACITY_EXCEEDED, PAIR_CAPACITY_EXCEEDED, ROD_CAPACITY_EXCEEDED
-from bilayer_core.model.records.step import Configuration, Point, Stage, Work
+from bilayer_core.model.records.step import Configuration, Point, Stage, StepAccount, Work
 from bilayer_core.model.rod_surfaces import NearPairs
 from bilayer_core.model.set_friction import friction_law, friction_values, none_given
 from bilayer_core.model.sizes import sizes_of
@@ -71,7 +70,7 @@ class Storage:
         first = min(points, FIRST_POINTS)
         self._capacity = Capacity(near, first, first, columns)
         self._pairs = NearPairs(model.rod_search, PAIRS_PER_POINT * first) if points else None
-        self.outcome = Outcome(counts=np.zeros(COUNTS, dtype=np.int64), figures=np.zeros(FIGURES))
+        self.outcome = Outcome()
         self._width, self._memory = np.zeros(1, dtype=np.int64), np.zeros(memory_size(model))
         self._sums, of_dimension = self._lasting_sums()
         self._groups = lasting_groups(model, self.sizes) | of_dimension
@@ -257,4 +256,5 @@ def new_work(sizes: dict[str, int], configurations: list[Configuration], stages:
         first=first,
         origin=origin,
         end=end,
+        account=StepAccount(),
     )

@@ -141,7 +141,7 @@ def write_inertia(fluid, node_mass, at):
 @piece(float, Fluid, Problem, Configuration, Stage, bool)
 def add_added_mass(fluid, p, at, stage, with_hessian):
     """Add the potential of the fluid's inertia and its derivatives by nodes and edges, z being where it was updated."""
-    sums, h, momentum_length = p.sums, stage.lengths[0], stage.lengths[1]
+    sums, h, momentum_length = p.sums, stage.length, stage.momentum_length
     if not sums.selected[ADDED_MASS]:
         return math.inf
     mass, edge_node, flow, shape_gradient = fluid.mass, fluid.edge_node, fluid.velocity, fluid.shape_gradient
@@ -207,7 +207,7 @@ def add_added_mass(fluid, p, at, stage, with_hessian):
 @piece(bool, Fluid, Problem, Configuration, Stage)
 def update_fluid(fluid, p, at, stage):
     """Make a configuration z: take directions and ∂T/∂q from it."""
-    velocity, position, origin, h = fluid.node_velocity, at.position, stage.origin_position, stage.lengths[0]
+    velocity, position, origin, h = fluid.node_velocity, at.position, stage.origin_position, stage.length
     for i in range(velocity.shape[0]):
         for c in range(3):
             velocity[i, c] = 0.0 if stage.still[0] == 1.0 else (position[i, c] - origin[i, c]) / h

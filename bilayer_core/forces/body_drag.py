@@ -40,7 +40,7 @@ class BodyFlow:
 @piece(float, BodyFlow, Problem, Configuration, Stage, bool)
 def add_body_drag(flow, p, at, stage, with_hessian):
     """Add the dissipation potential of the drag of bodies and its derivatives by their positions."""
-    sums, h = p.sums, stage.lengths[0]
+    sums, h = p.sums, stage.length
     if not sums.selected[BODY_DRAG]:
         return math.inf
     place, origin = at.body_position, stage.origin_body_position

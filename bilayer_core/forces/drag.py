@@ -54,7 +54,7 @@ def mixed_directions(before, part_before, after, part_after, at):
 @piece(float, Flow, Problem, Configuration, Stage, bool)
 def add_drag(flow, p, at, stage, with_hessian):
     """Add the dissipation potential of drag and its derivatives by nodes."""
-    sums, h = p.sums, stage.lengths[0]
+    sums, h = p.sums, stage.length
     if not sums.selected[DRAG]:
         return math.inf
     node, coefficient, direction, flow_velocity = flow.node, flow.coefficient, flow.direction, flow.velocity

@@ -100,7 +100,7 @@ def act_together(elastic, beta, rest, origin):
 def start_elements(_, p, start, stage):
     """Write the stiffness of elements over a stage and their rest strains, of those forces that are selected."""
     strands, viscosity, selected, edges = p.strands, p.viscosity, p.sums.selected, p.strands.edge_count
-    viscous, length = acts_viscously(p), stage.lengths[0]
+    viscous, length = acts_viscously(p), stage.length
     elastic, beta, origin = 1.0 * selected[STRETCHING], 0.0, 0.0
     for e in range(edges):
         if viscous:

@@ -67,7 +67,7 @@ def add_gyroscopic_force(spinning, p, at, stage, with_hessian):
 @piece(bool, Spinning, Problem, Configuration, Stage)
 def update_gyroscopic_force(spinning, p, at, stage):
     """Take F from a configuration; whether it differs by what moves an edge noticeably."""
-    strands, force, h, changed = p.strands, spinning.force, stage.lengths[0], False
+    strands, force, h, changed = p.strands, spinning.force, stage.length, False
     for k in range(force.shape[0]):
         length, inertia = at.length[k], strands.spin_inertia[k]
         factor = inertia * (at.total_angle[k] - stage.origin_angle[k]) / (h * h * length * length)
@@ -79,7 +79,7 @@ def update_gyroscopic_force(spinning, p, at, stage):
             change += abs(factor * turning[c] - force[k, c])
             force[k, c] = factor * turning[c]
         # the mass of an edge is about 3 J over the square of half its width
-        changed |= change * h * stage.lengths[1] * strands.half_width[k] ** 2 > 3.0 * UNSEEN * length * inertia
+        changed |= change * h * stage.momentum_length * strands.half_width[k] ** 2 > 3.0 * UNSEEN * length * inertia
     return changed
 
 

@@ -124,11 +124,11 @@ def body_inertia(bodies, factor, at, stage, sums, with_hessian):
 @piece(float, int, Problem, Configuration, Stage, bool)
 def add_inertial_forces(_, p, at, stage, with_hessian):
     """Add inertia, mass damping and gravity with their gradients by nodes, edges and free bodies."""
-    strands, bodies, sums, h = p.strands, p.bodies, p.sums, stage.lengths[0]
+    strands, bodies, sums, h = p.strands, p.bodies, p.sums, stage.length
     mass, spin_inertia, gradient = strands.node_mass, strands.spin_inertia, sums.node
     position, origin, departure = at.position, stage.origin_position, at.departure
     if sums.selected[INERTIA]:
-        factor = 1.0 / (h * stage.lengths[1])
+        factor = 1.0 / (h * stage.momentum_length)
         energy = 0.0
         for i in range(mass.shape[0]):
             weight = factor * mass[i]

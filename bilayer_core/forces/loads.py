@@ -65,7 +65,7 @@ def _pull_of_levers(loads, raised, at, stage, pull_out):
             force = height * loads.on_nodes[k, c]
             pull_out[r, c] -= force
             energy -= force * at.director1[raised.edge[r], c]
-            power += force * director_moved(raised, at, stage, r, c) / stage.lengths[0]
+            power += force * director_moved(raised, at, stage, r, c) / stage.length
     return energy, power
 
 
@@ -81,7 +81,7 @@ def in_axes_of_body(vector, k, factor, rotation, f, vector_out):
 @piece(float, PointForces, Problem, Configuration, Stage, bool)
 def add_point_forces(loads, p, at, stage, with_hessian):
     """Add the potential of forces and its gradient by nodes and free bodies."""
-    sums, slot, h = p.sums, loads.energy_slot, stage.lengths[0]
+    sums, slot, h = p.sums, loads.energy_slot, stage.length
     if sums.selected[slot]:
         found = point_force(loads.node, loads.on_nodes, at.position, stage.origin_position, h, sums.node)
         origin = stage.origin_body_position
@@ -134,7 +134,7 @@ def _power_of_moment(moment, k, rotation, stage, body, b):
             power -= (
                 0.5 * moment[k, c] * (origin[body, j, m] * rotation[b, i, m] - origin[body, i, m] * rotation[b, j, m])
             )
-    return power / stage.lengths[0]
+    return power / stage.length
 
 
 @piece(float, Moments, Problem, Configuration, Stage, bool)

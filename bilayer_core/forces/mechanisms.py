@@ -212,7 +212,7 @@ def limit_energy(beyond, stiffness, margin):
 @piece(float, Mechanisms, Problem, Configuration, Stage, bool)
 def add_mechanisms(mechanisms, p, at, stage, with_hessian):
     """Energy and derivatives of springs, limits, damping and friction."""
-    sums, h, own = p.sums, stage.lengths[0], mechanisms.gradient
+    sums, h, own = p.sums, stage.length, mechanisms.gradient
     own[:] = 0.0
     mechanisms.in_limits[0], mechanisms.limit_slope[:] = 0.0, 0.0
     conserved, resists = sums.selected[JOINTS], sums.selected[FRICTION]

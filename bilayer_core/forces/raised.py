@@ -155,9 +155,9 @@ def _add_weight(raised, gravity, at, pull_out):
 @piece(float, Raised, Problem, Configuration, Stage, bool)
 def add_raised_masses(raised, p, at, stage, with_hessian):
     """Add what inertia, mass damping and gravity of raised masses have beyond those of nodes, with its gradients."""
-    strands, sums, h, g = p.strands, p.sums, stage.lengths[0], p.gravity
+    strands, sums, h, g = p.strands, p.sums, stage.length, p.gravity
     if sums.selected[INERTIA]:
-        factor = 1.0 / (h * stage.lengths[1])
+        factor = 1.0 / (h * stage.momentum_length)
         sums.energy[INERTIA] += _add_inertia(raised, strands, factor, at, stage, sums)
     if p.damping > 0.0 and sums.selected[DAMPING]:
         energy = _add_damping(raised, strands, p.damping / h, at, stage, sums)

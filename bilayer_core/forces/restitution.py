@@ -89,7 +89,7 @@ def damping_at(p, stage, i, s, d):
     if row < 0 or restitution.rate[row] == 0.0:
         return 0.0, 0.0, 0.0
     d_hat, origin = p.surfaces.d_hat, stage.origin_strain[restitution.first + row]
-    beta = restitution.rate[row] / stage.lengths[0]
+    beta = restitution.rate[row] / stage.length
     part = beta * (d - origin)
     if part <= MOST:
         return part, beta, beta * (integral_of_barrier(d, d_hat) - (d - origin) * barrier(d, d_hat))
@@ -123,7 +123,7 @@ def add_restitution(_, p, at, stage, with_hessian):
 @piece(int, Restitution, Problem, Configuration, Stage)
 def start_restitution(restitution, p, start, stage):
     """Freeze λ of each pair [s/m]; returns a status."""
-    weight = math.sqrt(p.gravity[0] ** 2 + p.gravity[1] ** 2 + p.gravity[2] ** 2) * stage.lengths[0]
+    weight = math.sqrt(p.gravity[0] ** 2 + p.gravity[1] ** 2 + p.gravity[2] ** 2) * stage.length
     for k in range(restitution.rate.shape[0]):
         speed = p.memory[restitution.memory[0] + k]
         restitution.rate[k] = 0.0
@@ -140,7 +140,7 @@ def end_restitution(restitution, p, at, stage):
         i, s = restitution.point[k], restitution.surface[k]
         x, slot = at.contact_point, restitution.memory[0] + k
         gap = gap_normal(p.surfaces, at, p.surfaces.radius[i], s, x[i, 0], x[i, 1], x[i, 2])[0]
-        closing = max((stage.origin_strain[restitution.first + k] - gap) / stage.lengths[0], 0.0)
+        closing = max((stage.origin_strain[restitution.first + k] - gap) / stage.length, 0.0)
         known = abs(p.memory[slot])
         p.memory[slot] = -closing if gap >= p.surfaces.d_hat else max(known, closing)
     return READY

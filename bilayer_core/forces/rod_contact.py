@@ -60,7 +60,6 @@ from bilayer_core.jit.called import stack_vector
 from bilayer_core.jit.record import Matrix
 from bilayer_core.model.force_slots import slot_of
 from bilayer_core.model.records.contacts import RodContact
-from bilayer_core.model.records.outcome import STATUS
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY, ROD_CAPACITY_EXCEEDED
 from bilayer_core.model.records.step import Configuration, Stage
@@ -101,8 +100,8 @@ def find_rod_contacts(p, at):
 @piece(float, Problem, Configuration)
 def bound_between_rods(p, at):
     """Largest fraction of `System.node_step` that keeps rods apart; the status is left in `Outcome`."""
-    rods, step, status = p.rod_contact, p.system.node_step, p.outcome.counts
-    status[STATUS] = READY
+    rods, step, outcome = p.rod_contact, p.system.node_step, p.outcome
+    outcome.status = READY
     rails, place = rods.rails, at.position
     move, limit, swing, stray = largest_motion(step), 1.0, 0.0, 0.0
     if rails.exists:
@@ -116,7 +115,7 @@ def bound_between_rods(p, at):
         write_rail_steps(rails, p.strands, p.system, at, limit)
         step, stray = rails.step, 0.5 * limit * swing
     if not list_near_rods(p, place, step, limit, limit * move, stray):
-        status[STATUS] = ROD_CAPACITY_EXCEEDED
+        outcome.status = ROD_CAPACITY_EXCEEDED
         return 0.0
     return rod_step_bound(rods, p.strands, p.system, at, place, limit, 2.0 * limit * move)
 
@@ -266,7 +265,7 @@ def _add_friction(rods, stage, position, origin, gradient):
     """Add the gradient of the dissipation potential of lagged contacts, write its second derivatives, and return it
     [J] and the power that is lost [W].
     """
-    contacts, h, threshold, energy, lost = rods.sliding, stage.lengths[0], rods.threshold, 0.0, 0.0
+    contacts, h, threshold, energy, lost = rods.sliding, stage.length, rods.threshold, 0.0, 0.0
     weight, normal, matrix = contacts.weight, contacts.normal, contacts.matrix
     slip = stack_vector(3)
     for c in range(contacts.count[0]):
@@ -348,5 +347,5 @@ def rod_slip_along(rods, strands, stage, at, system, begin, path_out):
         path_out[k, 0], path_out[k, 1] = size, along
         path_out[k, 2], path_out[k, 3] = 0.0, math.sqrt(max(total - along * along, 0.0))
         path_out[k, 4] = path_out[k, 5] = path_out[k, 6] = coefficient * coefficient
-        path_out[k, 7], path_out[k, 8] = contacts.normal_force[c], coefficient * stage.lengths[0]
+        path_out[k, 7], path_out[k, 8] = contacts.normal_force[c], coefficient * stage.length
     return begin + contacts.count[0]

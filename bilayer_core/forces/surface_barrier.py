@@ -88,7 +88,7 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
             of_damping += stiffness * damping
             if part != 0.0:
                 origin = stage.origin_strain[p.restitution.first + p.restitution.row[i, s]]
-                lost -= slope * part * (d - origin) / stage.lengths[0]
+                lost -= slope * part * (d - origin) / stage.length
         curvature = stiffness * barrier_hessian(d, d_hat) * (elastic - part) - beta * slope
         slope *= elastic - part
         node = surfaces.near_node[k]

@@ -200,7 +200,7 @@ def _add_motion(motion, body, arm, sign, rate):
 def slip_paths(sliding, surfaces, strands, at, stage, system, path_out):
     """Write the slip paths of the lagged contacts in the present step, see `forces.friction_limit`."""
     arm, lever, slip, rate, s = stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
-    a, mu, step_length = sliding.axis, sliding.mu, stage.lengths[0]
+    a, mu, step_length = sliding.axis, sliding.mu, stage.length
     for k in range(sliding.count[0]):
         i, node = sliding.first[k], sliding.node[k]
         body, under = surfaces.contact_point_body[i], surfaces.body[sliding.surface[k]]
@@ -250,11 +250,11 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
         sideways = u[0] * across[0] + u[1] * across[1] + u[2] * across[2]
         ca = (mu[k, 0] if forward >= 0.0 else mu[k, 1]) ** 2
         cs = mu[k, 2] ** 2
-        scale = largest * stage.lengths[0]
+        scale = largest * stage.length
         speed = math.sqrt(ca * forward * forward + cs * sideways * sideways) / scale
         energy += normal_force * scale * friction_potential(speed, threshold)
         ratio = normal_force * friction_over_speed(speed, threshold) / scale
-        lost += ratio * (speed * scale) ** 2 / stage.lengths[0]
+        lost += ratio * (speed * scale) ** 2 / stage.length
         for c in range(3):
             q[c] = ca * forward * axis[k, c] + cs * sideways * across[c]
             g[c] = ratio * q[c]

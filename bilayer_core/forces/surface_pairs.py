@@ -9,7 +9,6 @@ from bilayer_core.contact.near import list_near, moved_since
 from bilayer_core.contact.step_bound import motion_of_points, motion_of_surfaces, step_bound
 from bilayer_core.jit import piece
 from bilayer_core.model.records.contacts import Surfaces
-from bilayer_core.model.records.outcome import PAIR, STATUS
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import PAIR_CAPACITY_EXCEEDED, READY
 from bilayer_core.model.records.step import Configuration
@@ -45,12 +44,12 @@ def bound_at_surfaces(p, at):
     """Largest fraction of the present step that keeps gaps to surfaces open; the near pair that sets it (−1: none) and
     a status are left in `Outcome`.
     """
-    surfaces, counts = p.surfaces, p.outcome.counts
+    surfaces, outcome = p.surfaces, p.outcome
     of_points = motion_of_points(surfaces, p.bodies, p.strands, p.system, at)
     closing = of_points + motion_of_surfaces(surfaces, p.system)
-    counts[PAIR], counts[STATUS] = -1, list_surface_pairs(surfaces, at, closing)
-    if counts[STATUS] != READY:
+    outcome.pair, outcome.status = -1, list_surface_pairs(surfaces, at, closing)
+    if outcome.status != READY:
         return 0.0
     closing = of_points + motion_of_surfaces(surfaces, p.system)  # extents of surfaces are those of the list
-    fraction, counts[PAIR] = step_bound(surfaces, p.strands, p.system, at, closing)
+    fraction, outcome.pair = step_bound(surfaces, p.strands, p.system, at, closing)
     return fraction

@@ -40,7 +40,7 @@ class TurningFlow:
 @piece(float, TurningFlow, Problem, Configuration, Stage, bool)
 def add_turning_drag(flow, p, at, stage, with_hessian):
     """Add the dissipation potential of turning edges and its derivatives by their angles."""
-    sums, h, coefficient = p.sums, stage.lengths[0], flow.coefficient
+    sums, h, coefficient = p.sums, stage.length, flow.coefficient
     if not sums.selected[TURNING_DRAG]:
         return math.inf
     lost = 0.0

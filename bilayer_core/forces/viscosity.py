@@ -55,7 +55,7 @@ def _energies(stiffness, elastic, beta, strain, rest, origin):
 def add_viscosity(_, p, at, stage, with_hessian):
     """Tell the energy of viscosity from those of the elements, which have counted both together."""
     viscosity, strands, sums, edges = p.viscosity, p.strands, p.sums, p.strands.edge_count
-    selected, length = sums.selected, stage.lengths[0]
+    selected, length = sums.selected, stage.length
     if not acts_viscously(p):
         return math.inf
     lost, elastic = 0.0, 1.0 * selected[STRETCHING]

@@ -170,7 +170,7 @@ def _record_text(declared: type[Record]) -> bytes:
     digest = hashlib.blake2b(f"record {declared.__module__}.{declared.__qualname__}".encode(), digest_size=16)
     for name, kind in declared.layout().fields.items():
         of = _record_text(kind) if isinstance(kind, type) and issubclass(kind, Record) else name_of(kind).encode()
-        digest.update(b"%s: %s; " % (name.encode(), of))
+        digest.update(b"%s: %s%s; " % (name.encode(), of, b" changes" * (name in declared.changing)))
     return digest.digest()
 
 

@@ -14,7 +14,8 @@ A shape after an array's type, of numbers and of names of sizes, makes `Record.z
 In memory every field begins at a multiple of eight bytes: a number takes one word, an array the words of numba's own
 descriptor of it, a record one for its address. The first word says whether the record `exists`: what a scene lacks is
 there with arrays of length zero (`Record.absent`). A record holds what its fields refer to, so its address is good as
-long as it is. Fields are not changed afterwards; an array's values may be.
+long as it is. Fields are not changed afterwards, but for an array's values, and for numbers that declare `CHANGES`:
+kernels and the interpreter assign to these, and they begin with 0.
 
 (Arrays passed one by one, or in tuples, are seven words each: a function of a hundred takes a minute to compile.
 Numba's `structref` counts references at every access.)
@@ -69,6 +70,8 @@ else:
     """Arrays of floats of single precision, as messages have them."""
 UNALLOCATED: Mapping[str, int] = defaultdict(int)
 """Sizes of a record whose arrays with a declared shape come later; see `Record.allocated`."""
+CHANGES: Any = object()
+"""In place of a field's shape: its number changes."""
 _ADDRESS_WORD = 4
 """Of the words of an array, which one its address is."""
 
@@ -102,6 +105,27 @@ class Layout:
         ]
 
 
+class _Changing:
+    """A number that changes, in the memory of its record."""
+
+    def __set_name__(self, owner: type[Record], name: str) -> None:
+        self._name = name
+
+    def _place(self, made: Record) -> tuple[np.ndarray, int]:
+        """Return the words of a record, as numbers of the declared type, and which of them is the number."""
+        kind = made.layout()
+        words = made._memory.view(np.float64) if kind.fields[self._name] is float else made._memory
+        return words, kind.offset[self._name]
+
+    def __get__(self, made: Record, owner: type[Record]) -> float:
+        words, place = self._place(made)
+        return made.layout().fields[self._name](words[place])
+
+    def __set__(self, made: Record, value: float) -> None:
+        words, place = self._place(made)
+        words[place] = value
+
+
 class Record:
     """Base of the classes that `record` makes.
 
@@ -113,8 +137,10 @@ class Record:
 
     names: tuple[str, ...] = ()
     shapes: typing.ClassVar[dict[str, tuple[int | str, ...]]] = {}
+    changing: typing.ClassVar[dict[str, int]] = {}
 
     def __init__(self, **values: Any):
+        values = self.changing | values
         self._hold(values)
         words = [1]
         for name, of, dtype in self.layout().declared_fields:
@@ -127,7 +153,7 @@ class Record:
         if values.keys() != fields.keys():
             wrong = ", ".join(sorted(values.keys() ^ fields.keys()))
             raise TypeError(f"{type(self).__name__}: these fields are missing or unknown: {wrong}")
-        self.__dict__.update(values)
+        self.__dict__.update((name, value) for name, value in values.items() if name not in self.changing)
 
     def _lie_in(self, memory: np.ndarray) -> None:
         self._memory, self.address = memory, _address(memory)
@@ -166,7 +192,7 @@ class Record:
         missing = tuple([name for name in cls.shapes if name not in values])
         block = _block(cls, missing, tuple([sizes[name] for name in _sizes_in(cls, missing)]))
         base, arrays = block.arrays()
-        made = cls.__new__(cls)
+        made, values = cls.__new__(cls), cls.changing | values
         made._hold(values | arrays)
         memory, kind = block.words.copy(), cls.layout()
         memory[block.addresses] += base
@@ -211,7 +237,10 @@ def record(declared: type) -> type:
     names = tuple(declared.__annotations__)
     body = {"__module__": declared.__module__, "__doc__": declared.__doc__, "__annotations__": declared.__annotations__}
     shapes = {name: vars(declared)[name] for name in names if name in vars(declared)}
-    return type(declared.__name__, (Record,), body | {"names": names, "shapes": shapes})
+    changing = {name: 0 for name in names if shapes.get(name) is CHANGES}
+    body |= {name: _Changing() for name in changing}
+    shapes = {name: shape for name, shape in shapes.items() if name not in changing}
+    return type(declared.__name__, (Record,), body | {"names": names, "shapes": shapes, "changing": changing})
 
 
 def shapes_of(declared: type[Record], sizes: Mapping[str, int], names: Iterable[str]) -> dict[str, tuple[int, ...]]:

@@ -123,9 +123,14 @@ class RunStatistics:
 
     def _take_extrema(self, stepper: Stepper) -> None:
         extrema, model = stepper.engine.extrema, stepper.model
-        self.com_max_height, self.min_gap, self.max_contact_force, *shape = extrema.figures.tolist()
-        self.max_curvature, self.max_strain, self.max_fibre_strain, self.max_curvature_by_thickness, *flows = shape
-        self.put_in, self.taken_out = flows
+        self.com_max_height, self.min_gap, self.max_contact_force = (
+            extrema.height,
+            extrema.least_gap,
+            extrema.contact_force,
+        )
+        self.max_curvature, self.max_strain = extrema.curvature, extrema.strain
+        self.max_fibre_strain, self.max_curvature_by_thickness = extrema.fibre_strain, extrema.curvature_by_thickness
+        self.put_in, self.taken_out = extrema.put_in, extrema.taken_out
         self.body_tops = dict(zip(model.bodies.names, extrema.body_top.tolist(), strict=True))
         if not model.has_surface_contact:
             return

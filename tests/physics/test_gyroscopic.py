@@ -44,9 +44,9 @@ def test_the_force_of_an_edge_has_the_moment_that_turns_its_spin_and_does_no_wor
     energy = evaluator.forces(at, ("gyroscopic",))["gyroscopic"]
     stage, node, edges = evaluator.stage, model.rods.edge_node, model.rods.edge_count
     edge, before = (x[node + 1] - x[node] for x in (at.position, stage.origin_position))
-    rate, tangent = (edge - before) / stage.lengths[0], at.tangent[:edges]
+    rate, tangent = (edge - before) / stage.length, at.tangent[:edges]
     turning = (rate - (rate * tangent).sum(axis=1)[:, None] * tangent) / at.length[:edges, None]
-    spin = (at.total_angle - stage.origin_angle) / stage.lengths[0]
+    spin = (at.total_angle - stage.origin_angle) / stage.length
     force = -evaluator.sums.edge[:edges, :3]
     wanted = -(model.rods.spin_inertia * spin)[:, None] * turning
     np.testing.assert_allclose(np.cross(edge, force), wanted, rtol=1e-9, atol=1e-12 * np.abs(wanted).max())

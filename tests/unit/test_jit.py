@@ -8,12 +8,13 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from numba import errors
 
 from bilayer_core.jit import caller, kernel, piece, record, record_at
 from bilayer_core.jit.called import stack_matrix, stack_vector
 from bilayer_core.jit.kernel import exact_kernel
 from bilayer_core.jit.piece import Piece, loading
-from bilayer_core.jit.record import Flags, IndexTable, Indices, Vector
+from bilayer_core.jit.record import CHANGES, Flags, IndexTable, Indices, Vector
 
 
 @record
@@ -70,6 +71,43 @@ class Reading:
 @piece(float, Reading, int)
 def read_for_another_piece(r, which):
     return read_for_a_test(r.outer, which=which, out=r.out)
+
+
+@record
+class Tally:
+    step: float
+    rounds: int = CHANGES
+    length: float = CHANGES
+    full: bool = CHANGES
+
+
+@piece(int, Tally, int)
+def add_rounds(tally, most):
+    for _ in range(most):
+        tally.rounds += 1
+        tally.length += tally.step
+    tally.full = tally.rounds > 3
+    return tally.rounds
+
+
+@piece(int, Tally)
+def change_what_lasts(tally):
+    tally.step = 2.0
+    return 0
+
+
+def test_kernels_and_the_interpreter_change_the_same_numbers_of_a_record():
+    tally = Tally(step=0.25)
+    assert (tally.rounds, tally.length, tally.full) == (0, 0.0, False)
+    assert add_rounds(tally, 3) == 3 and tally.length == 0.75 and not tally.full
+    tally.rounds, tally.length = 10, -0.5
+    assert add_rounds(tally, 1) == 11 and tally.length == -0.25 and tally.full
+    assert repr(tally) == "Tally(step=0.25, rounds=11, length=-0.25, full=True)"
+
+
+def test_a_kernel_may_not_change_a_number_whose_declaration_does_not_say_so():
+    with pytest.raises(errors.LoweringError, match="step does not change"):
+        change_what_lasts(Tally(step=0.25))
 
 
 @piece(float, Outer)

@@ -29,9 +29,6 @@ from bilayer_core.jit.called import stack_matrix
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 
-CONTACTS, UNKNOWNS = 0, 1
-"""Places in `ContactColumns.counts`: contacts, and unknowns with columns."""
-
 
 @piece(int, Problem, int)
 def take_rod_contacts(p, simplified):
@@ -41,11 +38,11 @@ def take_rod_contacts(p, simplified):
     has nothing negative.
     """
     rods, columns = p.rod_contact, p.contact_columns
-    columns.counts[CONTACTS] = columns.counts[UNKNOWNS] = 0
+    columns.contacts = columns.unknowns = 0
     for part in range(2):
         rate = rods.rails.rate if part == 0 else rods.rails.slip_rate
         _list_contacts(columns, rods.rails, rate, p.strands, simplified, rods.contacts if part == 0 else rods.sliding)
-    if columns.counts[CONTACTS] > 0:
+    if columns.contacts > 0:
         _add_own_sides(columns, p.system.band)
         _choose_unknowns(columns)
     if rods.rails.exists and rods.contacts.count[0] > 0:
@@ -56,7 +53,7 @@ def take_rod_contacts(p, simplified):
 @kernel
 def _list_contacts(columns, rails, rate, strands, simplified, contacts):
     """Append contacts to the list, with what moves their sides."""
-    begin, half = columns.counts[CONTACTS], columns.unknown.shape[1] // 2
+    begin, half = columns.contacts, columns.unknown.shape[1] // 2
     normal, direction, matrix = contacts.normal, contacts.segment_direction, stack_matrix(3, 3)
     for c in range(contacts.count[0]):
         e, tangential = begin + c, contacts.tangential_stiffness[c]
@@ -80,7 +77,7 @@ def _list_contacts(columns, rails, rate, strands, simplified, contacts):
             r0, r1, r2 = columns.rate[e, 0, a], columns.rate[e, 1, a], columns.rate[e, 2, a]
             for m in range(3):
                 columns.pressed[e, m, a] = matrix[m, 0] * r0 + matrix[m, 1] * r1 + matrix[m, 2] * r2
-    columns.counts[CONTACTS] = begin + contacts.count[0]
+    columns.contacts = begin + contacts.count[0]
 
 
 @kernel
@@ -166,7 +163,7 @@ def _entry(columns, c, a, b):
 def _add_own_sides(columns, band):
     """Add the blocks of either side of each contact by itself to the band."""
     half = columns.unknown.shape[1] // 2
-    for c in range(columns.counts[CONTACTS]):
+    for c in range(columns.contacts):
         for side in range(2):
             for a in range(side * half, (side + 1) * half):
                 row = columns.unknown[c, a]
@@ -209,7 +206,7 @@ def _add_curvature(rails, strands, band):
 @kernel
 def _choose_unknowns(columns):
     """Give contact columns to the smaller set of unknowns of each two strands in contact (or halves of one)."""
-    count, node, strand, mark, met = columns.counts[CONTACTS], columns.node, columns.strand, columns.mark, columns.met
+    count, node, strand, mark, met = columns.contacts, columns.node, columns.strand, columns.mark, columns.met
     half = columns.unknown.shape[1] // 2
     mark[:] = -1
     met[:] = 0
@@ -240,7 +237,7 @@ def _choose_unknowns(columns):
             columns.column[i] = chosen
             columns.row[chosen] = i
             chosen += 1
-    columns.counts[UNKNOWNS] = chosen
+    columns.unknowns = chosen
 
 
 @kernel
@@ -279,7 +276,7 @@ def condense_contacts_to_bodies(columns, attachments, strands, at, border):
         return
     axes, arm, attached, free = strands.axes, at.arm, columns.attached, attachments.free
     half = columns.unknown.shape[1] // 2
-    for c in range(columns.counts[CONTACTS]):
+    for c in range(columns.contacts):
         for a in range(half):
             i = columns.unknown[c, a]
             first = attached[i] if i >= 0 else -1
@@ -316,8 +313,8 @@ def move_to_border(p):
     there is no capacity for them, but `BorderedSystem.width` is what it would be.
     """
     columns, bordered, strands = p.contact_columns, p.bordered, p.strands
-    count, base = columns.counts[UNKNOWNS], bordered.width[0]
-    if columns.counts[CONTACTS] == 0 or (count == 0 and not p.joins.exists):
+    count, base = columns.unknowns, bordered.width[0]
+    if columns.contacts == 0 or (count == 0 and not p.joins.exists):
         return True
     if base + count > bordered.load.shape[0]:
         bordered.width[0] = base + count
@@ -332,7 +329,7 @@ def move_to_border(p):
 def _move_from_band(columns, bordered, strands, base, band):
     """Move contact columns to the border and corner, those from `base` on; the band keeps those of the identity."""
     border, corner, slot = bordered.border, bordered.schur, columns.column
-    bandwidth, count = strands.bandwidth, columns.counts[UNKNOWNS]
+    bandwidth, count = strands.bandwidth, columns.unknowns
     for k in range(count):
         column, own = columns.row[k], base + k
         for c in range(base):
@@ -359,7 +356,7 @@ def _column(columns, joins, freedom, base, row):
 def _add_between(columns, joins, freedom, bordered, base):
     """Add the blocks between the sides of contacts, of nodes that no body holds; one side of each has columns."""
     attached, half = columns.attached, columns.unknown.shape[1] // 2
-    for c in range(columns.counts[CONTACTS]):
+    for c in range(columns.contacts):
         for a in range(half):
             row = columns.unknown[c, a]
             if row < 0 or attached[row] >= 0:
@@ -384,8 +381,8 @@ def gather_columns(columns, bordered, right):
     """Move what is wanted of unknowns with contact columns from the right-hand side to `BorderedSystem.load`."""
     if not columns.exists:
         return
-    base = bordered.width[0] - columns.counts[UNKNOWNS]
-    for k in range(columns.counts[UNKNOWNS]):
+    base = bordered.width[0] - columns.unknowns
+    for k in range(columns.unknowns):
         bordered.load[base + k] = right[columns.row[k]]
         right[columns.row[k]] = 0.0
 
@@ -395,6 +392,6 @@ def scatter_columns(columns, bordered, right):
     """Move the step of unknowns with contact columns from `BorderedSystem.load` to that of all."""
     if not columns.exists:
         return
-    base = bordered.width[0] - columns.counts[UNKNOWNS]
-    for k in range(columns.counts[UNKNOWNS]):
+    base = bordered.width[0] - columns.unknowns
+    for k in range(columns.unknowns):
         right[columns.row[k]] = bordered.load[base + k]

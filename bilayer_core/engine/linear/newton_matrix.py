@@ -38,7 +38,6 @@ from bilayer_core.engine.linear.widths import eliminate, factorise_band, go_back
 from bilayer_core.engine.request_modes import SLOWEST_GROWTH, WITHOUT_INERTIA
 from bilayer_core.forces.rod_contact import rods_touch
 from bilayer_core.jit import piece
-from bilayer_core.model.records.outcome import REGULARISED, SHIFT, SIMPLIFIED
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import BORDER_CAPACITY_EXCEEDED, INDEFINITE, NOT_FINITE, READY
 from bilayer_core.model.records.step import Configuration, Stage
@@ -95,16 +94,16 @@ def factorise(p, at, stage, counts):
         In `Outcome`: the multiple of the masses that was added, and how far contacts of rods were simplified (see
         `engine.linear.contact_columns`).
     """
-    figures = p.outcome.figures
+    outcome = p.outcome
     strands, band = p.strands, p.system.band
-    factor = 1.0 / (stage.lengths[0] * stage.lengths[1]) + p.damping / stage.lengths[0]
+    factor = 1.0 / (stage.length * stage.momentum_length) + p.damping / stage.length
     shift, simplified = 0.0, EXACT
-    at_rest = counts and stage.lengths[0] >= WITHOUT_INERTIA
+    at_rest = counts and stage.length >= WITHOUT_INERTIA
     if at_rest:
         factor = SLOWEST_GROWTH * SLOWEST_GROWTH
     while True:
         assemble(p, at, factor * (1.0 + shift), simplified)
-        figures[SHIFT], figures[SIMPLIFIED] = shift, simplified
+        outcome.shift, outcome.simplified = shift, simplified
         of_bodies = factor if at_rest else shift * factor
         if p.border.exists:
             restrict_bodies(p, of_bodies)
@@ -121,14 +120,14 @@ def factorise(p, at, stage, counts):
                 p.system.negative[0] = negative + of_border
                 return READY if of_border >= 0 else NOT_FINITE
             if not p.bordered.exists or factor_border(p):
-                p.outcome.counts[REGULARISED] += shift > 0.0 or simplified > EXACT
+                p.outcome.regularised += shift > 0.0 or simplified > EXACT
                 return READY
         if simplified < 2 and rods_touch(p.rod_contact):
             simplified += 1
             continue
         shift = max(FIRST_SHIFT, shift * SHIFT_GROWTH)
         if shift > LARGEST_SHIFT:
-            figures[SHIFT] = shift
+            outcome.shift = shift
             return INDEFINITE
 
 

@@ -1,4 +1,4 @@
-"""Numba's types for what pieces and records declare, and how kernels read a record."""
+"""Numba's types for what pieces and records declare, and how kernels read and write a record."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from functools import cache, cached_property
 from typing import Any
 
 from llvmlite import ir
-from numba import types
-from numba.extending import models, register_model
+from numba import errors, types
+from numba.extending import lower_setattr_generic, models, register_model
 
 from bilayer_core.jit.compiler.undocumented import add_attributes, add_field
 from bilayer_core.jit.record import WORD, ArrayOf, Record
@@ -66,10 +66,24 @@ def _read_field(context, builder, of: RecordType, address, name: str):
         return builder.icmp_signed("!=", word, ir.Constant(_WORD_TYPE, 0))
     model = context.data_model_manager[of.fields[name]]
     kind = model.get_data_type()
-    place = builder.gep(address, [ir.Constant(_WORD_TYPE, WORD * of.offset[name])])
-    value = builder.load(builder.bitcast(place, kind.as_pointer()), align=WORD)
-    value.set_metadata("invariant.load", builder.module.add_metadata([]))  # fields do not change: out of loops with it
+    value = builder.load(_place(builder, of, address, name, kind), align=WORD)
+    if name not in of.declared.changing:  # out of loops with it
+        value.set_metadata("invariant.load", builder.module.add_metadata([]))
     return value if kind == model.get_value_type() else model.from_data(builder, value)
+
+
+@lower_setattr_generic(RecordType)
+def _write_field(context, builder, signature, arguments, name):
+    of, kind = signature.args
+    if name not in of.declared.changing:
+        raise errors.LoweringError(f"{of.name}.{name} does not change: its declaration does not say so")
+    builder.store(arguments[1], _place(builder, of, arguments[0], name, context.get_value_type(kind)), align=WORD)
+
+
+def _place(builder, of: RecordType, address, name: str, kind: ir.Type):
+    """Return the pointer to a field."""
+    place = builder.gep(address, [ir.Constant(_WORD_TYPE, WORD * of.offset[name])])
+    return builder.bitcast(place, kind.as_pointer())
 
 
 add_attributes(RecordType, _type_of_field, _read_field)

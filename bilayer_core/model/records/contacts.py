@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bilayer_core.contact.broad_phase import RodSearch
-from bilayer_core.jit.record import Flags, FlagTable, IndexTable, Indices, Matrix, Stack, Vector, record
+from bilayer_core.jit.record import CHANGES, Flags, FlagTable, IndexTable, Indices, Matrix, Stack, Vector, record
 
 
 @record
@@ -200,7 +200,8 @@ class RodContact:
 class ContactColumns:
     """Contacts of rods in the Newton matrix, and their columns in the border; see `engine.linear.contact_columns`."""
 
-    counts: Indices = (2,)  # of contacts and of nodes
+    contacts: int = CHANGES  # how many there are
+    unknowns: int = CHANGES  # how many have columns
     node: IndexTable = ("contact", 2)  # of contacts of barrier and friction in one list
     unknown: IndexTable = ("contact", "sides")  # that move the two sides, −1 for none
     rate: Stack = ("contact", 3, "sides")  # ∂r of each by these

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bilayer_core.jit.record import Flags, Indices, Matrix, Stack, Vector, record
+from bilayer_core.jit.record import CHANGES, Flags, Indices, Matrix, Stack, Vector, record
 from bilayer_core.model.records.contacts import ContactColumns, Restitution, RodContact, Sliding, Slips, Surfaces
 from bilayer_core.model.records.light import Light
 from bilayer_core.model.records.parts import (
@@ -123,10 +123,27 @@ class ForceTable:
 
 @record
 class Outcome:
-    """Results of a piece beside the number that it returns; slots in `model.records.outcome`."""
+    """Results of a piece beside the number that it returns."""
 
-    counts: Indices
-    figures: Vector
+    status: int = CHANGES  # how it ended, from `model.records.status`
+    pair: int = CHANGES  # near pair that blocks motion, −1 without one
+    configuration: int = CHANGES  # the last one
+    swapped: bool = CHANGES  # whether the scratch is the minimum
+    iterations: int = CHANGES
+    factorisations: int = CHANGES
+    settlings: int = CHANGES
+    regularised: int = CHANGES  # matrices
+    gains: int = CHANGES  # what the step makes of energy; see `engine.energy_account`
+    gained: float = CHANGES  # and steps together, over what they may
+    residual: float = CHANGES  # speed of Newton's last correction [m/s]
+    gap: float = CHANGES  # the smallest [m]
+    shift: float = CHANGES  # multiple of the masses that was added
+    simplified: int = CHANGES  # how far contacts of rods were
+    fraction: float = CHANGES  # of a step that keeps gaps open
+    friction_fraction: float = CHANGES  # at which friction holds it up
+    energy: float = CHANGES  # [J]
+    contact_error: float = CHANGES  # of the energy of contacts [J]
+    light_error: float = CHANGES  # as a part of the longest rod
 
 
 @record

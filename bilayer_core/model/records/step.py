@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bilayer_core.jit.record import Indices, Matrix, Stack, Tensor, Vector, record
+from bilayer_core.jit.record import CHANGES, Indices, Matrix, Stack, Tensor, Vector, record
 
 
 @record
@@ -44,7 +44,8 @@ class Stage:
     The velocity of whatever is at q is (q − origin)/(γ h).
     """
 
-    lengths: Vector = (2,)  # γ h and γ′ h [s], where p = p̄ + γ′ h × force for momenta
+    length: float = CHANGES  # γ h [s]
+    momentum_length: float = CHANGES  # γ′ h [s], where p = p̄ + γ′ h × force for momenta
     origin_position: Matrix = ("node", 3)  # of nodes [m]
     origin_angle: Vector = ("edge",)  # of edges, counted from the start of the stage [rad]
     origin_body_position: Matrix = ("free", 3)  # of free bodies [m]
@@ -141,12 +142,34 @@ class RunExtrema:
     voronoi_length: Vector  # of bending elements [m], shape (n_bend,)
     faces: Matrix  # heights of both faces over the curve at bending elements [m], shape (n_bend, 2)
     thickness: Vector  # of the whole section there [m], shape (n_bend,)
-    figures: Vector = (9,)  # see `engine.run_extrema`
+    height: float = CHANGES  # greatest of the rods' mass centre [m]
+    least_gap: float = CHANGES  # [m]
+    contact_force: float = CHANGES  # largest on a node [N]
+    curvature: float = CHANGES  # [1/m]
+    strain: float = CHANGES
+    fibre_strain: float = CHANGES
+    curvature_by_thickness: float = CHANGES
+    put_in: float = CHANGES  # energy that steps supplied [J]
+    taken_out: float = CHANGES  # and lost
     body_top: Vector = ("body",)  # greatest height of each body's position [m]
     nodes: Indices = ("surface",)  # that touch each surface now
     last_surface: Indices = ("node",)  # scratch
     most_nodes: Indices = ("surface",)
     first_contact: Vector = ("surface",)  # [s], NaN before
+
+
+@record
+class StepAccount:
+    """Energy of a step; see `engine.powers`."""
+
+    supplied: float = CHANGES  # [J]
+    lost: float = CHANGES
+    taken_up: float = CHANGES  # by barriers
+    supplying: float = CHANGES  # power at its last stage [W]
+    losing: float = CHANGES  # likewise
+    taking_up: float = CHANGES
+    driven: int = CHANGES  # by what
+    jumped: bool = CHANGES  # whether a stimulus has
 
 
 @record
@@ -170,7 +193,7 @@ class Work:
     mean_force: Vector = ("law",)  # likewise at the start and at stages, by their weights [J s]
     end_force: Vector = ("law",)  # and at its end
     rates: Matrix = ("body+world", 6)  # of bodies at the end of a stage [m/s, rad/s]
-    account: Vector = (8,)  # of the energy of a step; see `engine.powers`
+    account: StepAccount
 
 
 @record
