@@ -293,6 +293,7 @@ def stand_still_stage(p, state, start, with_fluid, stage):
     measure_directors(p.raised, start, stage.origin_strain)
     copy_directors(p.raised, start, stage.predicted_director)
     add_scaled(stage.origin_strain, -length, state.strain_rate)
+    stage.still[0] = 0.0
     stage.origin_fluid_momentum[:] = 0.0
     if with_fluid:
         momentum_at(p, start, state.velocity, state.strain_rate, stage.origin_fluid_momentum)

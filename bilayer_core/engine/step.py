@@ -298,6 +298,7 @@ def _evaluate_at_rest(p, state, work, at, scratch, counts):
     """
     here = configuration_at(work.configurations[at])
     stand_still_stage(p, state, here, counts, work.stage)
+    work.stage.still[0] = 1.0 if work.stage.length >= WITHOUT_INERTIA else 0.0
     status = start_stage(p, here, work.stage)
     if status != READY:
         return status, at

@@ -45,9 +45,19 @@ any more. What is left out of the Hessian makes Newton linear instead of quadrat
 h |u_t| k m₁/(m + m₁), k the largest wavenumber that bends in h; where that is not small, Newton fails and the step is
 halved.
 
-Where an equilibrium in a flow is looked for (`simulation.equilibrium`), displacements are no motion: ∂T/∂q is that of
-a body at rest, and P̄ has the directions of z, so that a body that turns on its way there does not feel the momentum
-which the flow has about it.
+At rest in the flow, v = 0 and dP/dt = 0, and the fluid's force is the gradient of a potential, V(q) = −T(q, v = 0).
+With a = U·m1, b = U·m2, c = U·t, and ε₁, ε₂, ε_t the parts of ε along m1, m2, t, per edge (m₁, m₂ its whole masses)
+
+    V = −½ m₁ a² − ½ m₂ b²,    ∂V/∂ε = (m₁ a m1 + m₂ b m2) c/l,    ∂V/∂θ = −(m₁ − m₂) a b,
+
+    l² ∂²V:  ε₁ε₁  m₁ (a² − c²)    ε₂ε₂  m₂ (b² − c²)     ε₁ε₂  ½ (m₁ + m₂) a b    ε₁ε_t  −m₁ a c    ε₂ε_t  −m₂ b c
+    l ∂²V:   ε₁θ   (m₁ − m₂) b c   ε₂θ   (m₁ − m₂) a c    and of θθ itself  (m₁ − m₂)(a² − b²)
+
+(in a plane, by the angle φ of the edge: ∂V/∂φ = σ m₁ a c, ∂²V/∂φ² = m₁ (a² − c²)). Statics
+(`simulation.equilibrium`) minimise V with the rest, with these exact derivatives. −m₁ c² is Lighthill's −M U² κ: along
+a straight strip the flow acts as a dead compression of M U², and a cantilever diverges at M U² = π² EI/4 L². A tail
+that sheds a wake would lack the force M U (∂_t + U ∂_s) w at its end; such a strip does not diverge but flutters, at a
+higher speed (Païdoussis 2014, ch. 8).
 """
 
 from __future__ import annotations
@@ -57,6 +67,15 @@ import math
 from bilayer_core.forces.raised import director_moved
 from bilayer_core.jit import kernel, piece
 from bilayer_core.kinematics.copying import copy
+from bilayer_core.kinematics.vector import (
+    add_column,
+    add_row,
+    add_upper_outer,
+    add_upper_symmetric,
+    combine,
+    dot,
+    row,
+)
 from bilayer_core.model.force_slots import slot_of
 from bilayer_core.model.records.parts import Fluid
 from bilayer_core.model.records.problem import Problem
@@ -138,11 +157,40 @@ def write_inertia(fluid, node_mass, at):
                     inertia[i, m, n] += mass2 * at.director2[k, m] * at.director2[k, n]
 
 
+@kernel
+def _add_potential_at_rest(fluid, p, at, with_hessian):
+    """Add V of a flow about edges at rest, and its derivatives."""
+    sums, plane, flow, energy = p.sums, p.plane, (fluid.velocity[0], fluid.velocity[1], fluid.velocity[2]), 0.0
+    for k in range(fluid.mass.shape[0]):
+        m1, m2, length = fluid.mass[k, 0], fluid.mass[k, 1], at.length[k]
+        t, d1, d2 = row(at.tangent, k), row(at.director1, k), row(at.director2, k)
+        a, b, c = dot(flow, d1), dot(flow, d2), dot(flow, t)
+        energy -= 0.5 * (m1 * a * a + m2 * b * b)
+        add_row(sums.edge, k, c / length, combine(m1 * a, d1, m2 * b, d2))
+        sums.edge[k, 3] -= (m1 - m2) * a * b
+        if with_hessian and plane.exists:
+            plane.polar_gradient[k, 1] += plane.side[k] * m1 * a * c
+            plane.polar_hessian[k, 2] += m1 * (a * a - c * c)
+        elif with_hessian:
+            hessian, inverse = sums.edge_hessian, 1.0 / length
+            square = inverse * inverse
+            add_upper_outer(hessian, k, m1 * (a * a - c * c) * square, d1)
+            add_upper_outer(hessian, k, m2 * (b * b - c * c) * square, d2)
+            add_upper_symmetric(hessian, k, 0.5 * (m1 + m2) * a * b * square, d1, d2)
+            add_upper_symmetric(hessian, k, -c * square, t, combine(m1 * a, d1, m2 * b, d2))
+            add_column(hessian, k, 3, (m1 - m2) * c * inverse, combine(b, d1, a, d2))
+            hessian[k, 3, 3] += (m1 - m2) * (a * a - b * b)
+    sums.energy[ADDED_MASS] = energy
+
+
 @piece(float, Fluid, Problem, Configuration, Stage, bool)
 def add_added_mass(fluid, p, at, stage, with_hessian):
     """Add the potential of the fluid's inertia and its derivatives by nodes and edges, z being where it was updated."""
     sums, h, momentum_length = p.sums, stage.length, stage.momentum_length
     if not sums.selected[ADDED_MASS]:
+        return math.inf
+    if stage.still[0] == 1.0:
+        _add_potential_at_rest(fluid, p, at, with_hessian)
         return math.inf
     mass, edge_node, flow, shape_gradient = fluid.mass, fluid.edge_node, fluid.velocity, fluid.shape_gradient
     direction1, direction2, origin_momentum = fluid.direction1, fluid.direction2, stage.origin_fluid_momentum
@@ -206,18 +254,17 @@ def add_added_mass(fluid, p, at, stage, with_hessian):
 
 @piece(bool, Fluid, Problem, Configuration, Stage)
 def update_fluid(fluid, p, at, stage):
-    """Make a configuration z: take directions and ∂T/∂q from it."""
+    """Make a configuration z: take directions and ∂T/∂q from it; returns whether there is anything to take."""
+    if stage.still[0] == 1.0:
+        return False
     velocity, position, origin, h = fluid.node_velocity, at.position, stage.origin_position, stage.length
     for i in range(velocity.shape[0]):
         for c in range(3):
-            velocity[i, c] = 0.0 if stage.still[0] == 1.0 else (position[i, c] - origin[i, c]) / h
+            velocity[i, c] = (position[i, c] - origin[i, c]) / h
     for r in range(p.raised.edge.shape[0]):
         for c in range(3):
-            moved = 0.0 if stage.still[0] == 1.0 else director_moved(p.raised, at, stage, r, c)
-            fluid.director_rate[r, c] = moved / h
+            fluid.director_rate[r, c] = director_moved(p.raised, at, stage, r, c) / h
     fluid_momentum(fluid, at)
-    if stage.still[0] == 1.0:
-        copy(fluid.momentum, stage.origin_fluid_momentum)
     for k in range(fluid.direction1.shape[0]):
         for c in range(3):
             fluid.direction1[k, c], fluid.direction2[k, c] = at.director1[k, c], at.director2[k, c]

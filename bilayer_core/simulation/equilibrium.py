@@ -3,7 +3,8 @@
 Each round minimises V(q) + ½ |q − q_k|²_M/h² from the shape q_k of the round before: an implicit Euler step of length h
 that forgets all velocity (the proximal point method). Whatever h is, V falls in every round, and the rounds end only
 where ∂V/∂q = 0; h grows tenfold while Newton's method succeeds, so that the last rounds are Newton's method on V alone.
-What depends on velocities vanishes there: friction, mass damping, and drag but for that of a fluid which flows.
+What depends on velocities vanishes there: friction, mass damping, and drag but for that of a fluid which flows. About
+added mass a flow has a potential (`forces.added_mass`).
 Forces that turn with what they act on, moments on bodies and light are taken at q_k and agree with the shape in the
 end. Whether the equilibrium is stable is asked of V, or of the modes of small motions where forces have no potential
 (`simulation.growing_modes`).
@@ -35,6 +36,9 @@ CAREFUL_GROWTH = 1.3
 """In place of growth once a round has failed, where forces turn with what they act on. Their part of the stiffness is
 not in the Hessian, so Newton converges for lengths h alone in which inertia outweighs it; rest is reached round by
 round."""
+LONGEST_AFTER_FAILURE = 0.6
+"""Of the length of a round that failed with careful growth: Newton converges up to there, and rounds of one length come
+to rest geometrically."""
 SETTLED, LONGEST = 1.0, 100.0
 """Two rounds at least so long [s] must find the shape at rest, one after the other but for failures, which come
 from rounding where nothing holds the robot; no round is longer than the second."""
@@ -120,13 +124,13 @@ def solve_static(
 
 
 def follows(model: Model) -> bool:
-    """Return whether forces that have no potential act at rest: followers, moments, or a flow."""
+    """Return whether forces that have no potential act at rest: followers, moments, or the drag of a flow."""
     flowing = model.flow.exists and bool(np.any(model.flow.velocity))
     return model.followers.exists or model.moments.exists or flowing
 
 
 def _carries_flow(model: Model) -> bool:
-    """Return whether a flow has momentum about added mass: that is in no matrix of modes either."""
+    """Return whether a flow has momentum about added mass: its gyroscopic force is in no matrix of modes."""
     return model.fluid.exists and bool(np.any(model.fluid.velocity))
 
 
@@ -183,7 +187,7 @@ class _Search:
     def run(self) -> StaticReport:
         state, engine = self.state, self.stepper.engine
         first_position, start = state.position.copy(), state.copy()
-        length, moved, settled, growth = FIRST, math.inf, 0, GROWTH
+        length, moved, settled, growth, longest = FIRST, math.inf, 0, GROWTH, LONGEST
         while self.rounds < MAX_ROUNDS:
             if self.light.exists:
                 self._drive(self.stepper)
@@ -203,12 +207,15 @@ class _Search:
                 raise self._failure("nothing holds the robot, or not all of it", moved)
             start.take(state)
             if not attempt.converged:  # V has fallen all the same
+                if growth == CAREFUL_GROWTH:
+                    longest = min(longest, LONGEST_AFTER_FAILURE * length)
                 length, settled, growth = SHRINKAGE * length, 0, self.growth_after_failure
                 continue
-            settled = settled + 1 if moved <= self.tolerance and length >= SETTLED else 0
+            enough = min(SETTLED, longest)
+            settled = settled + 1 if moved <= self.tolerance and length >= enough else 0
             if settled == 2:
                 return self._report(attempt.residual * length)
-            length = max(SETTLED, length) if moved <= self.tolerance else min(growth * length, LONGEST)
+            length = max(enough, length) if moved <= self.tolerance else min(growth * length, longest)
         hint = (
             ": forces that follow it have no potential; a run may come to rest" if follows(self.stepper.model) else ""
         )

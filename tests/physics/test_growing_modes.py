@@ -93,3 +93,17 @@ def test_a_strip_in_a_cross_flow_rests_where_a_run_ends_with_and_without_added_m
         assert np.abs(run.velocities).max() < 1e-9
         assert np.abs(rest.positions - run.positions).max() < 1e-9
         assert report.stable or added  # whose modes are not looked at
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_cantilever_along_a_flow_about_added_mass_diverges_as_under_a_dead_load(dimension):
+    """M U² = π² EI/4 L² (`forces.added_mass`)."""
+    width, length, modulus, height = 0.01, 0.1, 1e6, 1e-3
+    compression = 0.25 * np.pi**2 * modulus * width * height**3 / 12.0 / length**2
+    for share, stable in ((0.99, True), (1.01, False)):
+        speed = np.sqrt(share * compression / (0.25 * np.pi * 1000.0 * width**2))
+        water = {"drag_along": 0.0, "drag_across": 0.0, "velocity": [speed, 0, 0], "added_mass": True}
+        soft = {"gel": {**GEL, "youngs_modulus": modulus}}
+        strip = rod([layer()], length=length, stations=41, clamp_start="wall")
+        content = scene([strip], bodies=[fixed("wall")], materials=soft, fluid=water, solver={"dimension": dimension})
+        assert Simulator(load_scene(content)).solve_static().stable == stable
