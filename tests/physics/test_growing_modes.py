@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_bvp
 from support.sample_scenes import GEL, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
@@ -107,3 +108,31 @@ def test_a_cantilever_along_a_flow_about_added_mass_diverges_as_under_a_dead_loa
         strip = rod([layer()], length=length, stations=41, clamp_start="wall")
         content = scene([strip], bodies=[fixed("wall")], materials=soft, fluid=water, solver={"dimension": dimension})
         assert Simulator(load_scene(content)).solve_static().stable == stable
+
+
+def test_a_cantilever_aslant_in_a_flow_about_added_mass_rests_on_the_elastica():
+    """EI θ″ + M U² sin(θ − α) cos(θ − α) = 0, θ(0) = θ′(L) = 0, of an axis without length changes."""
+    width, length, modulus, height, speed, slant = 0.01, 0.1, 1e6, 1e-3, 0.04, 0.5
+    factor = 0.25 * np.pi * 1000.0 * (width * speed) ** 2 / (modulus * width * height**3 / 12.0)
+    solved = solve_bvp(
+        lambda s, y: np.vstack([y[1], -factor * np.sin(y[0] - slant) * np.cos(y[0] - slant)]),
+        lambda start, end: np.array([start[0], end[1]]),
+        np.linspace(0.0, length, 400),
+        np.zeros((2, 400)),
+        tol=1e-9,
+        max_nodes=100_000,
+    )
+    assert solved.status == 0
+    along = np.linspace(0.0, length, 20_001)
+    expected = np.trapezoid(np.sin(solved.sol(along)[0]), along)
+    errors = []
+    for stations in (21, 41):
+        flow = [speed * np.cos(slant), 0, speed * np.sin(slant)]
+        water = {"drag_along": 0.0, "drag_across": 0.0, "velocity": flow, "added_mass": True}
+        strip = rod([layer()], length=length, stations=stations, clamp_start="wall")
+        soft = {"gel": {**GEL, "youngs_modulus": modulus}}
+        simulator = Simulator(load_scene(scene([strip], bodies=[fixed("wall")], materials=soft, fluid=water)))
+        assert simulator.solve_static().stable
+        errors.append(abs(simulator.positions[-1, 2] / expected - 1.0))
+    assert errors[1] < 3e-4
+    assert errors[0] / errors[1] == pytest.approx(4.0, abs=0.5)
