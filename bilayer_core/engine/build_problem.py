@@ -82,7 +82,7 @@ def slips_of(model: Model, sizes: dict[str, int]) -> Slips:
     law = model.scene.contact.friction if model.scene.contact else None
     if law is None or not law.acts:
         return Slips.absent()
-    return Slips.zeros(sizes, threshold=law.speed_threshold)
+    return Slips.zeros(sizes)
 
 
 def rod_contact_of(

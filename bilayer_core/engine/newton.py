@@ -322,6 +322,8 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
                     status = UNSETTLED
                     break
                 curved, task, previous, begun = False, UPDATE_LAGGED, math.inf, iterations
+                if p.sliding.exists and p.sliding.places[0] > 0 and p.sliding.relaxation[0] == 0.0:
+                    task = FACTORISE  # friction acts at other places, of which the old matrix knows nothing
                 continue
         if not settled and iterations - begun >= max_iterations:
             status = MAX_ITERATIONS

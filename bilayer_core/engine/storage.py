@@ -23,6 +23,7 @@ from bilayer_core.engine.capacity import (
 from bilayer_core.forces.force_register import force_table, memory_size, require_computed
 from bilayer_core.forces.friction_limit import PATH_SIZE
 from bilayer_core.forces.mechanisms import mechanisms_record
+from bilayer_core.forces.surface_friction import MOST_PLACES, PARTS
 from bilayer_core.jit import shapes_of, zeros_in_one
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.contacts import ContactColumns, RodContact, RodContactList, Sliding, Slips, Surfaces
@@ -104,12 +105,14 @@ class Storage:
     def _make(self) -> Problem:
         model, capacity, before = self._model, self._capacity, self._problem
         surfaces, rods = model.has_surface_contact, self._pairs is not None
+        places = min(PARTS * model.node_count, MOST_PLACES) if model.sliding.spreads and capacity.near else 0
         sizes = self.sizes | {
             "near": capacity.near,
-            "link": 2 * capacity.near,
-            "arm": 2 * capacity.near + 1,
+            "slide": capacity.near + places,
+            "link": 2 * capacity.near + places,
+            "arm": 2 * capacity.near + places + 1,
             "column": capacity.columns,
-            "slip": capacity.near + capacity.sliding,
+            "slip": capacity.near + places + capacity.sliding,
             "path": PATH_SIZE,
         }
         border = rods or capacity.columns > 0

@@ -12,7 +12,7 @@ grows with α, and the step ends where it is zero, at rest of one contact, mostl
 contact grows in proportion to α (bodies that turn do so nearly): its *slip path* is, with u·a and u·s as in
 `forces.surface_friction`,
 
-    u·a, δu·a, u·s, δu·s, μ₊², μ₋², μ_s², λ, μ h
+    u·a, δu·a, u·s, δu·s, μ₊², μ₋², μ_s², λ, μ h, ε_v
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from bilayer_core.jit import kernel, piece
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.step import Configuration, Stage
 
-PATH_SIZE = 9
+PATH_SIZE = 10
 """Numbers of a contact's slip path."""
 PASSED = 0.1
 """Of −φ′(0): no step ends before a smaller slope than this."""
@@ -34,12 +34,13 @@ MAX_HALVINGS = 50
 
 
 @kernel
-def _dissipated(count, path, threshold, fraction):
+def _dissipated(count, path, fraction):
     """Σ D′(α) and Σ D″(α) [J]"""
     first, second = 0.0, 0.0
     for k in range(count):
         forward, side = path[k, 0] + fraction * path[k, 1], path[k, 2] + fraction * path[k, 3]
         ca, cs, normal_force, scale = path[k, 4] if forward >= 0.0 else path[k, 5], path[k, 6], path[k, 7], path[k, 8]
+        threshold = path[k, 9]
         speed = math.sqrt(ca * forward * forward + cs * side * side) / scale
         work = ca * forward * path[k, 1] + cs * side * path[k, 3]
         ratio = friction_over_speed(speed, threshold)
@@ -52,7 +53,7 @@ def _dissipated(count, path, threshold, fraction):
 
 
 @kernel
-def friction_limit(count, path, threshold, slope, bound):
+def friction_limit(count, path, slope, bound):
     """Fraction of a step, at most `bound`, after which friction stops it.
 
     Parameters
@@ -61,18 +62,16 @@ def friction_limit(count, path, threshold, slope, bound):
         Number of contacts.
     path : Array
         Slip paths of contacts, shape (≥ count, `PATH_SIZE`).
-    threshold : float
-        ε_v [m/s].
     slope : float
         φ′(0) ≤ 0 [J], of a step with the exact Hessian.
     bound : float
     """
     enough = PASSED * -slope
-    force, curvature = _dissipated(count, path, threshold, 0.0)
+    force, curvature = _dissipated(count, path, 0.0)
     other, rest = max(-slope - curvature, 0.0), slope - force
     low, high, middle = 0.0, bound, bound
     for _ in range(MAX_HALVINGS):
-        present = rest + middle * other + _dissipated(count, path, threshold, middle)[0]
+        present = rest + middle * other + _dissipated(count, path, middle)[0]
         if abs(present) <= enough or (middle == bound and present <= enough):
             break
         if present > 0.0:
@@ -92,4 +91,4 @@ def limit_by_friction(p, at, stage, slope, bound):
         slip_paths(sliding, p.surfaces, p.strands, at, stage, system, slips.path)
     if p.rod_contact.exists:
         count = rod_slip_along(p.rod_contact, p.strands, stage, at, system, count, slips.path)
-    return friction_limit(count, slips.path, slips.threshold, slope, bound) if count > 0 else bound
+    return friction_limit(count, slips.path, slope, bound) if count > 0 else bound

@@ -348,4 +348,5 @@ def rod_slip_along(rods, strands, stage, at, system, begin, path_out):
         path_out[k, 2], path_out[k, 3] = 0.0, math.sqrt(max(total - along * along, 0.0))
         path_out[k, 4] = path_out[k, 5] = path_out[k, 6] = coefficient * coefficient
         path_out[k, 7], path_out[k, 8] = contacts.normal_force[c], coefficient * stage.length
+        path_out[k, 9] = rods.threshold
     return begin + contacts.count[0]

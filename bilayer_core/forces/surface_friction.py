@@ -26,6 +26,13 @@ points are one, on the face of the body or rod, x − r n, and so the moments ca
 node and turns with the edges there, by a rate that is frozen with the contact (`forces.rod_arms`). F is positive
 semidefinite.
 
+A station of a rod stands for half an edge on each side. Where the slip of two neighbouring stations that press on a
+plane turns round between them, or close by, their shares of that edge are spread over `PARTS` places of it for the rest
+of the stage: slip is linear between stations, and what rests may be anywhere. A place slips as fast as the next one
+within f₁ of a threshold that is widened to the difference of the two, so that friction is continuous as what rests
+moves along: f₁′ falls linearly to 0 there, and such hats add up to 1. (By stations alone the stride of a strip that
+extends is off by several percent, as its resting point is always a station.)
+
 Contacts are frozen at the start of a stage, and anew at each minimum of the potential, until that minimum stays: so λ,
 n and a are those of the stage's own end, without which integrators lose their order. The normal force that λ makes
 differs from it by a factor of about μ |A_nt|/A_nn, with A the compliance of what touches: where that is near 1 or
@@ -66,6 +73,16 @@ FRICTION = slot_of("friction")
 NO_DIRECTION = 1e-6
 """Sine of the angle between a grain and the normal below which it has no direction in the tangent plane."""
 LEAST_RELAXATION, LARGEST_RELAXATION = 0.3, 3.0
+PARTS = 8
+"""Places of an edge at which it slides where its slip turns round."""
+MOST_PLACES = 256 * PARTS
+"""Of rods, at most: where slip turns round in more edges than that, the others slide at stations alone."""
+BESIDE = 0.5
+"""How far beside an edge slip may turn round for it to have such places, in its own length."""
+ALIKE = 0.25
+"""Part of the slip within which a contact sticks by which slips may differ without friction that does."""
+SAME_SECTION = 4
+"""Contacts of a rod and surface at most from one station to the same place of the next one's section."""
 
 
 @kernel
@@ -223,6 +240,7 @@ def slip_paths(sliding, surfaces, strands, at, stage, system, path_out):
             largest = max(largest, mu[k, c])
         path_out[k, 7] = sliding.load[k] if largest > 0.0 else 0.0
         path_out[k, 8] = largest * step_length if largest > 0.0 else step_length
+        path_out[k, 9] = sliding.smooth[k]
 
 
 @piece(float, Sliding, Problem, Configuration, Stage, bool)
@@ -233,13 +251,13 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
         return math.inf
     for b in range(at.rotation.shape[0]):
         product_transposed(at.rotation, b, sliding.back, b, sliding.rotation, b)
-    axis, mu, threshold = sliding.axis, sliding.mu, sliding.threshold
+    axis, mu = sliding.axis, sliding.mu
     arm, lever, u = stack_vector(3), stack_vector(3), stack_vector(3)
     g, q, across, hessian = stack_vector(3), stack_vector(3), stack_vector(3), stack_matrix(3, 3)
     arm[0] = arm[1] = arm[2] = 0.0
     energy = lost = 0.0
     for k in range(sliding.count[0]):
-        i, node, normal_force = sliding.first[k], sliding.node[k], sliding.load[k]
+        i, node, normal_force, threshold = sliding.first[k], sliding.node[k], sliding.load[k], sliding.smooth[k]
         largest = max(mu[k, 0], mu[k, 1], mu[k, 2])
         if largest == 0.0:
             continue
@@ -309,7 +327,7 @@ def _freeze(sliding, p, at, stage):
         same &= sliding.part[count, 0] == mix[1] and sliding.part[count, 1] == mix[5]
         sliding.first[count], sliding.surface[count], sliding.node[count] = i, s, node
         sliding.part[count, 0], sliding.part[count, 1] = mix[1], mix[5]
-        sliding.last_load[count] = sliding.load[count]
+        sliding.smooth[count], sliding.last_load[count] = sliding.threshold, sliding.load[count]
         sliding.load[count] = -surfaces.stiffness * weight * barrier_gradient(d, surfaces.d_hat)
         if p.restitution.exists:
             sliding.load[count] *= 1.0 - damping_at(p, stage, i, s, d)[0]
@@ -323,9 +341,123 @@ def _freeze(sliding, p, at, stage):
             write_rate(surfaces, at, node, mix, arm, count, sliding.arm_rate)
         _write_axis(sliding, surfaces, at, count, i, s, node, n)
         count += 1
+    whole = count
+    if count > 1 and sliding.spreads:
+        count = _spread(sliding, p, at, stage, count)
+        for k in range(whole, count):
+            same &= sliding.same[k]
     same &= count == sliding.count[0]
-    sliding.count[0] = count
+    sliding.count[0], sliding.places[0] = count, count - whole
     return same
+
+
+@kernel
+def _next_station(sliding, surfaces, strands, k, count):
+    """Return the contact of the next station of a rod with the same surface, at the same place of its section; −1
+    without one.
+    """
+    i, w = sliding.node[k], sliding.part[k, 1]
+    if strands.edge_node[surfaces.node_edges[i, 1]] != i:  # the end of a rod
+        return -1
+    for j in range(k + 1, min(k + SAME_SECTION, count)):
+        if sliding.surface[j] != sliding.surface[k] or surfaces.contact_point_body[sliding.first[j]] >= 0:
+            return -1
+        v = sliding.part[j, 1]
+        if sliding.node[j] == i + 1 and (w > 0.0) == (v > 0.0) and (w < 0.0) == (v < 0.0):
+            return j
+    return -1
+
+
+@kernel
+def _tangential_slip(sliding, p, at, stage, k, arm, lever, slip_out):
+    """Slip of a contact since the origin of the stage in its tangent plane [m]."""
+    _slip(sliding, p.surfaces, p.strands, at, stage, k, arm, lever, slip_out)
+    n = sliding.normal
+    along = slip_out[0] * n[k, 0] + slip_out[1] * n[k, 1] + slip_out[2] * n[k, 2]
+    for c in range(3):
+        slip_out[c] -= along * n[k, c]
+
+
+@kernel
+def _change(u, v, stuck):
+    """Difference of the slips of two stations [m], and whether what is between them or close by slips less than
+    `stuck`, or than from place to place; not if it is so small that friction hardly differs.
+    """
+    change = along = first = 0.0
+    for c in range(3):
+        change += (v[c] - u[c]) ** 2
+        along += u[c] * (v[c] - u[c])
+        first += u[c] * u[c]
+    if change <= (ALIKE * stuck) ** 2:
+        return math.sqrt(change), False
+    part = min(max(-along / change, -BESIDE), 1.0 + BESIDE)
+    least = first + part * (2.0 * along + part * change)
+    return math.sqrt(change), least <= max(stuck * stuck, change / PARTS**2)
+
+
+@kernel
+def _share(surfaces, i, e):
+    """Return what of the load of a station acts on edge e beside it."""
+    b, a = surfaces.node_edges[i, 0], surfaces.node_edges[i, 1]
+    return 1.0 if b == a else surfaces.edge_length[e] / (surfaces.edge_length[b] + surfaces.edge_length[a])
+
+
+@kernel
+def _spread(sliding, p, at, stage, count):
+    """Spread contacts of stations over edges in which slip has turned round; returns the number of all contacts.
+
+    What an edge takes is its share of the station's whole load, whatever the edge before it took.
+    """
+    surfaces, whole, step = p.surfaces, count, stage.length
+    most = sliding.load.shape[0] - surfaces.near_gap.shape[0]
+    arm, lever, u, v = stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
+    for b in range(at.rotation.shape[0]):
+        product_transposed(at.rotation, b, sliding.back, b, sliding.rotation, b)
+    for k in range(whole):
+        sliding.left[k] = sliding.load[k]
+    for k in range(whole):
+        if surfaces.contact_point_body[sliding.first[k]] >= 0 or surfaces.sharpest[sliding.surface[k]] >= 0.0:
+            continue
+        j = _next_station(sliding, surfaces, p.strands, k, whole)
+        if j < 0 or count - whole + PARTS > most:
+            continue
+        _tangential_slip(sliding, p, at, stage, k, arm, lever, u)
+        _tangential_slip(sliding, p, at, stage, j, arm, lever, v)
+        i, s = sliding.node[k], sliding.surface[k]
+        e = surfaces.node_edges[i, 1]
+        change, turns = _change(u, v, sliding.threshold * step)
+        sliding.spread[s, e] |= turns
+        if not sliding.spread[s, e]:
+            continue
+        for part in range(PARTS):
+            near = k if 2 * part < PARTS else j
+            share = _share(surfaces, i if near == k else i + 1, e)
+            _add_place(sliding, surfaces, at, k, j, near, (part + 0.5) / PARTS, arm, count)
+            sliding.load[count] = share * sliding.load[near] * 2.0 / PARTS
+            sliding.smooth[count] = max(sliding.threshold, change / (PARTS * step))
+            sliding.left[near] -= share * sliding.load[near] * 2.0 / PARTS
+            count += 1
+    for k in range(whole):
+        sliding.load[k] = max(sliding.left[k], 0.0)
+    return count
+
+
+@kernel
+def _add_place(sliding, surfaces, at, k, j, near, part, arm, count):
+    """Write the contact of a place of the edge between the stations of contacts k and j, of which one is `near`."""
+    i, s, w = sliding.node[k], sliding.surface[k], sliding.part[near, 1]
+    same = count < sliding.count[0] and sliding.first[count] == sliding.first[near] and sliding.surface[count] == s
+    sliding.same[count] = same and sliding.part[count, 0] == part and sliding.part[count, 1] == w
+    sliding.first[count], sliding.surface[count], sliding.node[count] = sliding.first[near], s, i
+    sliding.part[count, 0], sliding.part[count, 1] = part, w
+    sliding.last_load[count] = sliding.load[count]
+    for c in range(3):
+        arm[c] = sliding.arm[k, c] + part * (sliding.arm[j, c] - sliding.arm[k, c])
+        sliding.arm[count, c] = arm[c]
+        sliding.lever[count, c] = sliding.lever[k, c] + part * (sliding.lever[j, c] - sliding.lever[k, c])
+        sliding.normal[count, c], sliding.axis[count, c] = sliding.normal[near, c], sliding.axis[near, c]
+        sliding.mu[count, c] = sliding.mu[near, c]
+    write_rate(surfaces, at, i, (0.0, part, 0.0, 1.0, 0.0, 0.0), arm, count, sliding.arm_rate)
 
 
 @kernel
@@ -351,6 +483,8 @@ def _relax(sliding, same):
 def start_surface_friction(sliding, p, start, stage):
     """Freeze the contacts at the start of a stage; returns a status."""
     if sliding.acts:
+        if sliding.places[0] > 0:
+            sliding.spread[:, :] = False
         _freeze(sliding, p, start, stage)
         sliding.relaxation[0] = 0.0
     return READY

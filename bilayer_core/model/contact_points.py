@@ -150,6 +150,7 @@ def build_contact(
             node_axis=found.column("node_axis", np.int64),
             surface_grain=surface_grain,
             point_grain=point_grain,
+            spreads=bool((sharpest < 0.0).any()),
             **friction_values(friction, point_body >= 0, surface_grain, point_grain),
         ),
         surface_names=tuple(s.collider.name for s in surfaces),

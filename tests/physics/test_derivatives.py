@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from support.evaluations import Problem, check
 from support.records_by_hand import changed
-from support.sample_scenes import ball, contact, everything, layer, rod, scene
+from support.sample_scenes import GROUND, ball, contact, everything, layer, rod, scene
 from support.slips import dissipation
 
+from bilayer_core.forces.surface_friction import PARTS
 from bilayer_core.model.force_list import FORCES
 
 ELASTIC = ("stretching", "bending", "twisting", "bond")
@@ -122,6 +123,18 @@ def test_friction_along_a_step_is_that_of_the_ways_of_contacts(hub):
     assert found[0] == pytest.approx(expected[0], rel=1e-12)
     assert np.diff(found) == pytest.approx(np.diff(expected), rel=1e-2)
     assert abs(found[2] - found[0]) > 1e-3 * found[0]
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_friction_where_slip_turns_round_within_edges_agrees_with_differences(dimension):
+    law = contact(coefficient=0.4)
+    law["friction"] |= {"forward": 0.3, "backward": 0.5}
+    strip = rod([layer()], length=0.03, stations=7, start=(0, 0, 9e-4))
+    content = scene([strip], contact=law, obstacles=[GROUND])
+    problem = Problem(content, np.random.default_rng(3), "laminate", dimension, noise=5e-5)
+    assert problem.evaluator.problem.sliding.count[0] >= 7 + 2 * PARTS
+    check(problem, ("friction",))
+    assert problem.terms["friction"] > 0.0
 
 
 SHAPES = {

@@ -15,7 +15,9 @@ def way_of(slip, rate, load=1.0, coefficient=0.5, forward=None):
     """One contact with equal coefficients all round, but for that forward if it is given, which is smaller."""
     square = coefficient**2
     ahead = square if forward is None else forward**2
-    return np.array([[*(slip[0], rate[0], slip[1], rate[1]), ahead, square, square, load, coefficient * STEP]])
+    return np.array(
+        [[*(slip[0], rate[0], slip[1], rate[1]), ahead, square, square, load, coefficient * STEP, THRESHOLD]]
+    )
 
 
 def derivatives(function, at, h):
@@ -42,7 +44,7 @@ def test_a_step_that_would_turn_a_contact_round_ends_where_that_rests(turning_po
     way = way_of((-turning_point * rate, side), (rate, 0.0))
     slope = -0.3 * abs(rate)  # of which friction, 2 μ λ |δu|, is a multiple
     along = potential_along(way, slope)
-    fraction = friction_limit(1, way, THRESHOLD, slope, 1.0)
+    fraction = friction_limit(1, way, slope, 1.0)
     assert abs(derivatives(along, fraction, 1e-7)[0]) <= 1.01 * PASSED * abs(slope)
     assert abs(fraction - turning_point) * abs(rate) < ZONE  # it sticks
     fractions = np.linspace(0.0, 1.0, 4001)
@@ -55,15 +57,15 @@ def test_a_step_is_not_held_up_by_contacts_that_slip_on_or_yield_to_it():
     on = way_of((100.0 * ZONE, 0.0), (rate, 0.0))
     weak = way_of((0.4 * rate, 0.0), (-rate, 0.0), load=1e-3)
     for way in (on, weak):
-        assert friction_limit(1, way, THRESHOLD, -0.3 * rate, 1.0) == 1.0
-        assert friction_limit(1, way, THRESHOLD, -0.3 * rate, 0.25) == 0.25
-    assert friction_limit(0, np.empty((0, PATH_SIZE)), THRESHOLD, -1.0, 0.5) == 0.5
+        assert friction_limit(1, way, -0.3 * rate, 1.0) == 1.0
+        assert friction_limit(1, way, -0.3 * rate, 0.25) == 0.25
+    assert friction_limit(0, np.empty((0, PATH_SIZE)), -1.0, 0.5) == 0.5
 
 
 @pytest.mark.parametrize("rate, is_held", [(400.0 * ZONE, False), (-400.0 * ZONE, True)])
 def test_a_contact_at_rest_holds_a_step_up_by_the_friction_of_the_way_it_goes(rate, is_held):
     way = way_of((0.0, 0.0), (rate, 0.0), forward=0.2)  # 0.5 backward
-    fraction = friction_limit(1, way, THRESHOLD, -0.3 * abs(rate), 1.0)
+    fraction = friction_limit(1, way, -0.3 * abs(rate), 1.0)
     assert (fraction * abs(rate) < ZONE) if is_held else fraction == 1.0
 
 
@@ -77,4 +79,4 @@ def test_sticking_and_slipping_on_the_ground_takes_few_iterations():
         before = simulator.summary()["newton_iterations"]
         simulator.run(STEP)
         iterations.append(simulator.summary()["newton_iterations"] - before)
-    assert max(iterations) < 24
+    assert sum(iterations) < 260  # 297 where friction does not limit steps

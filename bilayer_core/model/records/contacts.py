@@ -107,21 +107,27 @@ class Sliding:
     world_axis: Vector  # 0 without one, shape (3,)
     surface_grain: Matrix  # forward direction on each in its body's frame, 0 without one, shape (n_surface, 3)
     point_grain: Matrix  # likewise of contact points, shape (n_contact_point, 3)
-    mu: Matrix = ("near", 3)  # coefficients of contacts: forward, backward, sideways
+    spreads: bool  # whether a surface is a plane, on which stations spread their loads where slip turns round
+    mu: Matrix = ("slide", 3)  # coefficients of contacts: forward, backward, sideways
     count: Indices = (1,)
-    first: Indices = ("near",)
-    node: Indices = ("near",)  # of contacts of rods
-    surface: Indices = ("near",)
-    part: Matrix = ("near", 2)  # along the edge after the node, and across: which of the points of a node it is
-    load: Vector = ("near",)
-    last_load: Vector = ("near",)  # before contacts were frozen anew
-    change: Vector = ("near",)  # of normal forces then, before relaxation
+    places: Indices = (1,)  # how many of them are places of edges
+    spread: FlagTable = ("surface", "edge")  # in which slip has turned round in this stage
+    first: Indices = ("slide",)
+    node: Indices = ("slide",)  # of contacts of rods
+    surface: Indices = ("slide",)
+    part: Matrix = ("slide", 2)  # along the edge after the node, and across: which of the points of a node it is
+    smooth: Vector = ("slide",)  # thresholds of contacts [m/s]
+    load: Vector = ("slide",)
+    left: Vector = ("slide",)  # what places of edges leave of them
+    same: Flags = ("slide",)  # whether such a place was there before
+    last_load: Vector = ("slide",)  # before contacts were frozen anew
+    change: Vector = ("slide",)  # of normal forces then, before relaxation
     relaxation: Vector = (1,)  # with which they were, 0 at the start of a stage
-    normal: Matrix = ("near", 3)
-    axis: Matrix = ("near", 3)
-    arm: Matrix = ("near", 3)  # of bodies
-    arm_rate: Stack = ("near", 3, 8)  # of rods, as in `forces.rod_arms`
-    lever: Matrix = ("near", 3)
+    normal: Matrix = ("slide", 3)
+    axis: Matrix = ("slide", 3)
+    arm: Matrix = ("slide", 3)
+    arm_rate: Stack = ("slide", 3, 8)  # of rods, as in `forces.rod_arms`
+    lever: Matrix = ("slide", 3)
     back: Stack = ("body+world", 3, 3)
     rotation: Stack = ("body+world", 3, 3)
     origin_rotation: Stack = ("body+world", 3, 3)
@@ -131,7 +137,6 @@ class Sliding:
 class Slips:
     """Slip of all lagged contacts along a Newton step; see `forces.friction_limit`."""
 
-    threshold: float
     path: Matrix = ("slip", "path")
 
 

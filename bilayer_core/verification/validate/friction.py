@@ -204,6 +204,37 @@ def speed_over_grain(angle: float, off: float, solver: dict) -> tuple[float, flo
     return float(np.linalg.norm(error)), 0.0
 
 
+STRAIN, STRIP = 0.05, 0.1
+"""How much a crawling strip extends, and its length [m]."""
+
+
+def stride(forward: float, backward: float, stations: int) -> tuple[float, float]:
+    """Way of the middle of a strip [mm] that extends evenly and goes back.
+
+    It rests where the friction of what slides backward and of what slides forward are equal: at the part
+    μ₊/(μ₊ + μ₋) of its length as it extends, and at 1 minus that as it goes back. So it advances by ε L times the
+    difference.
+    """
+    muscle = layer(thickness=1e-4, material="film", eigenstrain={"stimulus": "pulse", "gain": STRAIN})
+    law = contact(2e-5, coefficient=backward, speed_threshold=1e-5)
+    law["friction"] |= {"forward": forward, "backward": backward}
+    content = scene(
+        [rod([muscle], length=STRIP, stations=stations, start=(0, 0, 6e-5))],
+        materials={"film": {"youngs_modulus": 1e9, "poisson_ratio": 0.5, "density": 1000.0}},
+        gravity=[0, 0, -GRAVITY],
+        stimuli={"pulse": {"schedule": {"type": "table", "times": [0, 1, 2], "values": [0, 1, 0]}}},
+        obstacles=[GROUND],
+        contact=law,
+        start="settle",
+        duration=2.2,
+    )
+    content["solver"] = {}
+    simulator = Simulator(load_scene(content))
+    simulator.run()
+    middle = simulator.rods["rod"].positions[stations // 2, 0] - 0.5 * STRIP
+    return 1e3 * float(middle), 1e3 * STRAIN * STRIP * (backward - forward) / (backward + forward)
+
+
 def _named(solver: dict) -> str:
     if "integrator" in solver:
         return f"{solver['integrator']}, {1e3 * solver['dt']:g} ms"
@@ -251,5 +282,16 @@ CASES = [
         )
         for angle in (0.0, 77.0)
         for what, off in (("along it", 0.0), ("against it, stuck", 180.0), ("40° off it", 40.0), ("100° off it", 100.0))
+    ),
+    *(
+        Case(
+            f"friction/stride/{forward:g} and {backward:g}, {stations} stations",
+            "ε L (μ₋ − μ₊)/(μ₋ + μ₊), by the place where an evenly extending strip rests",
+            0.01,
+            lambda forward=forward, backward=backward, stations=stations: stride(forward, backward, stations),
+            "mm",
+        )
+        for forward, backward in ((0.4, 0.5), (0.2, 0.8))
+        for stations in (21, 41, 81)
     ),
 ]
