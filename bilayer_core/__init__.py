@@ -65,7 +65,9 @@ def __dir__() -> list[str]:
 
 
 def _installed_version() -> str:
-    """Version of the installed distribution; a checkout that is only on the import path has none and says so."""
+    """Return the version of the installed distribution; a checkout that is only on the import path has none and says
+    so.
+    """
     from importlib.metadata import PackageNotFoundError, version
 
     try:

@@ -76,7 +76,7 @@ def outcome(run: RunData) -> Outcome:
 
 
 def node_command(module: str, **parameters: str | float | bool) -> list[str]:
-    """Command line of one of our nodes."""
+    """Return the command line of one of our nodes."""
     command = [sys.executable, "-m", f"bilayer_sim_ros.{module}", "--ros-args", "--log-level", "warn"]
     for name, value in parameters.items():
         command += ["-p", f"{name}:={str(value).lower() if isinstance(value, bool) else value}"]

@@ -135,7 +135,7 @@ def _parts(scene) -> dict[str, list[str]]:
 
 
 def _light(channel) -> str:
-    """Where a channel shines from, as the rest of a sentence."""
+    """Return where a channel shines from, as the rest of a sentence."""
     if channel.light is None:
         return ""
     hidden = "hidden by rods, bodies and obstacles" if channel.light.shadow else "hidden by nothing: shadow is false"
@@ -143,7 +143,7 @@ def _light(channel) -> str:
 
 
 def _grain(scene, surface) -> str:
-    """How friction on a surface differs with the direction, as the rest of a sentence."""
+    """Return how friction on a surface differs with the direction, as the rest of a sentence."""
     law = scene.contact.friction if scene.contact is not None else None
     if surface is None or law is None or not law.acts:
         return ""
@@ -215,7 +215,7 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
 
 
 def _time(report: dict[str, Any]) -> str:
-    """How much time is simulated, in which steps."""
+    """Return how much time is simulated, in which steps."""
     duration, dt = report["duration"], report["dt"]
     if report["tolerance"] is None:
         return f"{duration:g} s in {round(duration / dt)} steps of {1e3 * dt:g} ms"

@@ -71,7 +71,7 @@ class VerbGroup(click.Group):
         self.params.append(_debug_option())
 
     def list_commands(self, context: click.Context) -> list[str]:
-        """Names of the verbs."""
+        """Return the names of the verbs."""
         return list(self.commands)
 
 

@@ -183,7 +183,7 @@ def _short(topics: tuple[str, ...]) -> list[str]:
 
 
 def _values(option: str, texts: tuple[str, ...]) -> dict[str, float | None]:
-    """Numbers by name, None where the schedule is to act."""
+    """Return the numbers by name, None where the schedule is to act."""
     found = {}
     for text in texts:
         name, equals, value = text.partition("=")

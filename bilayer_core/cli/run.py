@@ -242,7 +242,7 @@ def _simulate(
 def _summary(
     simulator: Simulator, duration: float, failure: BilayerError | None, judge: _Judge | None
 ) -> dict[str, Any]:
-    """All figures of the run."""
+    """Return all figures of the run."""
     from bilayer_core.simulation.run_result import Termination
 
     summary = {**simulator.summary(), "duration": duration}

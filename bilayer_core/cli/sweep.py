@@ -177,7 +177,7 @@ def _list(read: Any) -> None:
 
 
 def reasons(result: Any, most: int = 5) -> list[str]:
-    """Lines about runs that are not done: the commonest reasons, each with how many."""
+    """Return the lines about runs that are not done: the commonest reasons, each with how many."""
     from collections import Counter
 
     counted: Counter[str] = Counter()

@@ -60,7 +60,7 @@ class RodSearch:
 
 @kernel
 def _square_distance(position, i, s, j):
-    """Square of the distance of the point at s on edge (i, i+1) from the segment (j, j+1) [m²]."""
+    """Return the square of the distance of the point at s on edge (i, i+1) from the segment (j, j+1) [m²]."""
     p0 = (1.0 - s) * position[i, 0] + s * position[i + 1, 0]
     p1 = (1.0 - s) * position[i, 1] + s * position[i + 1, 1]
     p2 = (1.0 - s) * position[i, 2] + s * position[i + 1, 2]

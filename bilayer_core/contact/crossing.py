@@ -77,7 +77,7 @@ def crossing(strands, surfaces, at):
 
 @kernel
 def _seen_from(position, axes, s, x, a):
-    """Where node a is in the frame of surface s [m]."""
+    """Return where node a is in the frame of surface s [m]."""
     z0, z1, z2 = x[a, 0] - position[s, 0], x[a, 1] - position[s, 1], x[a, 2] - position[s, 2]
     return (
         axes[s, 0, 0] * z0 + axes[s, 1, 0] * z1 + axes[s, 2, 0] * z2,
@@ -112,7 +112,7 @@ def _crosses_within_step(surfaces, at, a, s):
 
 @kernel
 def _thickness(surfaces, s):
-    """Least half thickness of a surface, and a little [m]."""
+    """Return the least half thickness of a surface, and a little [m]."""
     least = min(surfaces.size[s, 0], surfaces.size[s, 1], surfaces.size[s, 2])
     return least + surfaces.rounding[s] + FINE * surfaces.bound[s]
 

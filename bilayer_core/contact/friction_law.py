@@ -10,7 +10,7 @@ from bilayer_core.jit import kernel
 
 @kernel
 def friction_potential(v, threshold):
-    """f₀(v) = v²/ε − v³/(3ε²), continued by v − ε/3 [m/s]."""
+    """Return f₀(v) = v²/ε − v³/(3ε²), continued by v − ε/3 [m/s]."""
     if v >= threshold:
         return v - threshold / 3.0
     return v * v / threshold * (1.0 - v / (3.0 * threshold))
@@ -18,7 +18,7 @@ def friction_potential(v, threshold):
 
 @kernel
 def friction_over_speed(v, threshold):
-    """f₁(v)/v, finite at rest [s/m]."""
+    """Return f₁(v)/v, finite at rest [s/m]."""
     if v >= threshold:
         return 1.0 / v
     return (2.0 - v / threshold) / threshold
@@ -26,7 +26,7 @@ def friction_over_speed(v, threshold):
 
 @kernel
 def friction_slope(v, threshold):
-    """f₁′(v) [s/m]."""
+    """Return f₁′(v) [s/m]."""
     if v >= threshold:
         return 0.0
     return 2.0 * (1.0 - v / threshold) / threshold

@@ -41,14 +41,14 @@ NEAREST = 1e-12
 
 @kernel
 def brightness(side, facing, visible):
-    """b of an element whose outward normal is `side` × m1, or both of these for 0."""
+    """Return b of an element whose outward normal is `side` × m1, or both of these for 0."""
     seen = abs(facing) if side == 0.0 else max(0.0, side * facing)
     return visible * seen
 
 
 @kernel
 def _step(z):
-    """0 below −1/2, 1 above 1/2, smooth between."""
+    """Return 0 below −1/2, 1 above 1/2, smooth between."""
     z = min(max(z + 0.5, 0.0), 1.0)
     return z * z * (3.0 - 2.0 * z)
 
@@ -136,7 +136,9 @@ def _in_frame(light, s, b, r):
 
 @kernel
 def _along_ray(kind, size, s, y, v, tau):
-    """Distance of a ray's point from a surface [m], and its slope; y is where the surface is, seen from the start."""
+    """Return the distance of a ray's point from a surface [m], and its slope; y is where the surface is, seen from the
+    start.
+    """
     q0, q1, q2 = tau * v[0] - y[0], tau * v[1] - y[1], tau * v[2] - y[2]
     d, g0, g1, g2 = shape_distance(kind, size[s, 0], size[s, 1], size[s, 2], q0, q1, q2)
     return d, g0 * v[0] + g1 * v[1] + g2 * v[2]

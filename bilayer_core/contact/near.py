@@ -47,7 +47,8 @@ times as hard as at half its distance.
 
 @kernel
 def gap_normal(surfaces, at, radius, s, x0, x1, x2):
-    """Gap between a contact point of a radius [m] and surface s, were the point at x, and the surface's outward normal.
+    """Return the gap between a contact point of a radius [m] and surface s, were the point at x, and the surface's
+    outward normal.
 
     Parameters
     ----------
@@ -127,7 +128,7 @@ def _note(surfaces, k, i, s, gap, node, arm, mix, radius, weight):
 
 @kernel
 def spacing_between(surfaces, s, radius):
-    """Distance of points h that surface s demands of a rod with half the thickness `radius` [m]."""
+    """Return the distance of points h that surface s demands of a rod with half the thickness `radius` [m]."""
     fine = math.sqrt(4.0 * (surfaces.sharpest[s] + radius) * SAG * surfaces.d_hat)
     return max(fine, surfaces.least_spacing[s])
 
@@ -296,7 +297,7 @@ def list_near(surfaces, at, margin):
 
 @kernel
 def moved_since(surfaces, at):
-    """Largest motion of a contact point plus that of a surface's point since the list was made [m]."""
+    """Return the largest motion of a contact point plus that of a surface's point since the list was made [m]."""
     point, listed_point = at.contact_point, surfaces.listed_contact_point
     position, listed_position = at.surface_position, surfaces.listed_surface_position
     axes, listed_axes = at.surface_rotation, surfaces.listed_surface_rotation

@@ -36,7 +36,7 @@ def place_rails(rails, at):
 
 @kernel
 def _slope(strands, system, at, e):
-    """σ of an edge."""
+    """Return σ of an edge."""
     n, step, square = strands.edge_node[e], system.node_step, 0.0
     for c in range(3):
         square += (step[n + 1, c] - step[n, c]) ** 2

@@ -25,7 +25,8 @@ FAR, NEAR = 8.0, 2.0  # barrier distances: `KEPT_FRACTION` of one and `TOUCH` of
 
 @kernel
 def rod_step_bound(rods, strands, system, at, position, limit, closing):
-    """Largest α ≤ `limit` found such that all gaps keep `KEPT_FRACTION` of themselves in all parts of a step up to α.
+    """Return the largest α ≤ `limit` found such that all gaps keep `KEPT_FRACTION` of themselves in all parts of a step
+    up to α.
 
     A pair that stays beyond the barrier distance sets no bound: of large gaps less is kept. So what is found does not
     depend on which of these pairs are listed, or looked at.
@@ -88,7 +89,9 @@ def rod_step_bound(rods, strands, system, at, position, limit, closing):
 
 @kernel
 def _square_distance(position, step, fraction, i, s, j):
-    """Square of the distance of the point at s on (i, i+1) from the segment (j, j+1) at x + fraction · step [m²]."""
+    """Return the square of the distance of the point at s on (i, i+1) from the segment (j, j+1) at x + fraction · step
+    [m²].
+    """
     x0, x1 = _moved(position, step, fraction, i), _moved(position, step, fraction, i + 1)
     return _between(x0, x1, s, _moved(position, step, fraction, j), _moved(position, step, fraction, j + 1))
 
@@ -114,7 +117,7 @@ def _square_distance_of_rails(rails, strands, system, at, fraction, i, s, j):
 
 @kernel
 def _between(x0, x1, s, y0, y1):
-    """Square of the distance of the point at s between x0 and x1 from the segment between y0 and y1 [m²]."""
+    """Return the square of the distance of the point at s between x0 and x1 from the segment between y0 and y1 [m²]."""
     p = combine3(1.0 - s, x0, s, x1, -1.0, y0)
     e = combine(1.0, y1, -1.0, y0)
     t = min(max(dot(p, e) / dot(e, e), 0.0), 1.0)

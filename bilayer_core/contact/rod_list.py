@@ -33,7 +33,7 @@ it to serve, its path [m], and that before which none of its pairs comes to the 
 
 @kernel
 def largest_motion(step):
-    """Largest motion of a node in a step [m], the mean of all taken off.
+    """Return the largest motion of a node in a step [m], the mean of all taken off.
 
     A translation common to all nodes brings none of them nearer to another.
     """
@@ -65,8 +65,8 @@ def _mean(vectors):
 
 @kernel
 def _stray(search, position, step, fraction):
-    """Largest distance of a node at x + fraction · step from a list's motion, at the moment of this that is nearest to
-    all [m], the mean of all taken off, as in `RodSearch.base` and `tip`.
+    """Return the largest distance of a node at x + fraction · step from a list's motion, at the moment of this that is
+    nearest to all [m], the mean of all taken off, as in `RodSearch.base` and `tip`.
     """
     base, tip = search.base, search.tip
     count = position.shape[0]

@@ -27,7 +27,7 @@ from bilayer_core.jit import kernel
 
 @kernel
 def fraction_along(p0, p1, p2, position, j):
-    """τ of a point on the segment (j, j+1), not clamped."""
+    """Return τ of a point on the segment (j, j+1), not clamped."""
     x0, x1, x2 = position[j, 0], position[j, 1], position[j, 2]
     e0, e1, e2 = position[j + 1, 0] - x0, position[j + 1, 1] - x1, position[j + 1, 2] - x2
     along = (p0 - x0) * e0 + (p1 - x1) * e1 + (p2 - x2) * e2
@@ -36,7 +36,7 @@ def fraction_along(p0, p1, p2, position, j):
 
 @kernel
 def distance_at(p0, p1, p2, position, j, t):
-    """Distance [m] of a point from that at fraction t of the segment (j, j+1)."""
+    """Return the distance [m] of a point from that at fraction t of the segment (j, j+1)."""
     d0 = p0 - (1.0 - t) * position[j, 0] - t * position[j + 1, 0]
     d1 = p1 - (1.0 - t) * position[j, 1] - t * position[j + 1, 1]
     d2 = p2 - (1.0 - t) * position[j, 2] - t * position[j + 1, 2]
@@ -45,7 +45,7 @@ def distance_at(p0, p1, p2, position, j, t):
 
 @kernel
 def square_distance(p0, p1, p2, position, j):
-    """Square of the distance of a point from the segment (j, j+1) [m²]: what is far needs no root."""
+    """Return the square of the distance of a point from the segment (j, j+1) [m²]: what is far needs no root."""
     d0, d1, d2 = p0 - position[j, 0], p1 - position[j, 1], p2 - position[j, 2]
     e0, e1 = position[j + 1, 0] - position[j, 0], position[j + 1, 1] - position[j, 1]
     e2 = position[j + 1, 2] - position[j, 2]

@@ -30,7 +30,7 @@ PLANE, SPHERE, BOX, CYLINDER = 0, 1, 2, 3
 
 @kernel
 def shape_distance(kind, a, b, c, x, y, z):
-    """φ [m] and ∇φ at a point of the shape's frame, as (φ, g₀, g₁, g₂)."""
+    """Return φ [m] and ∇φ at a point of the shape's frame, as (φ, g₀, g₁, g₂)."""
     if kind == PLANE:
         return z, 0.0, 0.0, 1.0
     if kind == SPHERE:
@@ -61,7 +61,7 @@ def shape_distance(kind, a, b, c, x, y, z):
 
 @kernel
 def shape_curvature(kind, a, b, c, x, y, z):
-    """∇²φ [1/m] at a point outside, as its upper triangle (h₀₀, h₀₁, h₀₂, h₁₁, h₁₂, h₂₂)."""
+    """Return ∇²φ [1/m] at a point outside, as its upper triangle (h₀₀, h₀₁, h₀₂, h₁₁, h₁₂, h₂₂)."""
     distance, g0, g1, g2 = shape_distance(kind, a, b, c, x, y, z)
     if kind == PLANE:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

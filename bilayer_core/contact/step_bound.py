@@ -40,7 +40,7 @@ MAX_ADVANCES = 50  # what is reached by then is kept: a bound all the same
 
 @kernel
 def _turned(v0, v1, v2, t, r0, r1, r2):
-    """exp(t [r]×) v"""
+    """Return exp(t [r]×) v"""
     angle = t * math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
     if angle == 0.0:
         return v0, v1, v2
@@ -56,7 +56,7 @@ def _turned(v0, v1, v2, t, r0, r1, r2):
 
 @kernel
 def _fastest(motion, b, extent):
-    """|δX| + |δφ| extent of a body in a step [m]."""
+    """Return |δX| + |δφ| extent of a body in a step [m]."""
     shift = motion[b, 0] ** 2 + motion[b, 1] ** 2 + motion[b, 2] ** 2
     angle = motion[b, 3] ** 2 + motion[b, 4] ** 2 + motion[b, 5] ** 2
     return math.sqrt(shift) + math.sqrt(angle) * extent
@@ -86,7 +86,7 @@ def _speed_of_node(surfaces, system, at, i):
 
 @kernel
 def _turn_of_edge(surfaces, strands, system, at, e):
-    """Bounds of |ė|/l, |θ̇| and |ë|/l of an edge during a step."""
+    """Return the bounds of |ė|/l, |θ̇| and |ë|/l of an edge during a step."""
     n, step, square = strands.edge_node[e], system.node_step, 0.0
     for c in range(3):
         square += (step[n + 1, c] - step[n, c]) ** 2
@@ -123,7 +123,7 @@ def _motion_of_rod_points(surfaces, strands, system, at):
 
 @kernel
 def motion_of_points(surfaces, bodies, strands, system, at):
-    """Largest motion of a contact point in a step [m]."""
+    """Return the largest motion of a contact point in a step [m]."""
     step, square = system.node_step, 0.0
     for i in range(surfaces.node_free.shape[0]):
         if surfaces.node_free[i]:
@@ -136,7 +136,9 @@ def motion_of_points(surfaces, bodies, strands, system, at):
 
 @kernel
 def motion_of_surfaces(surfaces, system):
-    """Largest motion of a point of a surface in a step [m], by the extents that the list of near pairs has."""
+    """Return the largest motion of a point of a surface in a step [m], by the extents that the list of near
+    pairs has.
+    """
     largest = 0.0
     for s in range(surfaces.body.shape[0]):
         largest = max(largest, _fastest(system.motion, surfaces.body[s], surfaces.extent[s]))
@@ -154,7 +156,7 @@ def _carry(t0, t1, t2, m0, m1, m2, angle, u0, u1, u2):
 
 @kernel
 def _node_at(surfaces, system, at, i, t):
-    """Displacement of a node at a part t of a step, and its rate, as one tuple."""
+    """Return the displacement of a node at a part t of a step, and its rate, as one tuple."""
     step, b = system.node_step, surfaces.moved_by[i]
     if b < 0:
         return t * step[i, 0], t * step[i, 1], t * step[i, 2], step[i, 0], step[i, 1], step[i, 2]
@@ -209,7 +211,7 @@ def _rod_point_at(surfaces, strands, system, at, k, t, moved_out, rate_out):
 
 @kernel
 def step_bound(surfaces, strands, system, at, closing):
-    """Largest α ≤ 1 such that all gaps keep `KEPT_FRACTION` of themselves along β step, 0 ≤ β ≤ α.
+    """Return the largest α ≤ 1 such that all gaps keep `KEPT_FRACTION` of themselves along β step, 0 ≤ β ≤ α.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ NO_JUMP = 1e-9
 
 @kernel
 def _value(spans, row, k, time):
-    """`Span.value`"""
+    """Return `Span.value`"""
     level, begin, rate = spans[row, k, LEVEL], spans[row, k, BEGIN], spans[row, k, RATE]
     wave = spans[row, k, AMPLITUDE], spans[row, k, FREQUENCY], spans[row, k, PHASE]
     return value_of_span(time, level, begin, rate, wave[0], wave[1], wave[2])
@@ -88,7 +88,7 @@ def _any_jumps(spans, time, same):
 
 @piece(int, Actuation, float, float)
 def jumps_at(actuation, time, same):
-    """1 if a stimulus jumps at a time [s], plus 2 if a load does."""
+    """Return 1 if a stimulus jumps at a time [s], plus 2 if a load does."""
     return int(_any_jumps(actuation.stimulus, time, same)) + 2 * int(_any_jumps(actuation.load, time, same))
 
 

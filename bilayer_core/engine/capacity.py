@@ -54,7 +54,7 @@ class Capacity:
 
 
 def surface_pairs_for(needed: int) -> int:
-    """Capacity for more pairs of points and surfaces than `needed`.
+    """Return the capacity for more pairs of points and surfaces than `needed`.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def columns_for(needed: int, rows: int) -> int:
 
 
 def _twice(needed: int, most: int, what: str, remedy: Remedy, why: str = "") -> int:
-    """Capacity for twice what is needed, so that arrays are seldom made anew, and for `most` at most."""
+    """Return the capacity for twice what is needed, so that arrays are seldom made anew, and for `most` at most."""
     if needed > most:
         raise CapacityError(f"{needed} {what}, at most {most} are computed{f' ({why})' if why else ''}", remedy)
     return min(2 * needed, most)

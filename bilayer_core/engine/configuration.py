@@ -119,7 +119,9 @@ def update_attached(p, at):
 
 @piece(int, Problem, Configuration, Configuration)
 def transport_frames(p, base, at):
-    """Frames of `base`, carried to the positions of `at` and turned by its angles; in a plane those of positions."""
+    """Return the frames of `base`, carried to the positions of `at` and turned by its angles; in a plane those of
+    positions.
+    """
     _transport_in_space(p.space, p.strands, base, at, at.angle)
     _frames_in_plane(p.plane, p.strands, at)
     return READY

@@ -86,7 +86,7 @@ DAMPING_SHARE = 0.01
 
 @kernel
 def _kinetic(p, state, at):
-    """Kinetic energy of nodes, edges, free bodies and the fluid [J]."""
+    """Return the kinetic energy of nodes, edges, free bodies and the fluid [J]."""
     fluid, energy = p.fluid, kinetic_energy(p, state)
     if fluid.exists:
         move_fluid(fluid, p.raised, state.velocity, state.strain_rate)
@@ -100,8 +100,8 @@ def _kinetic(p, state, at):
 
 @kernel
 def _energies(p, state, at):
-    """T + V, that in barriers, and what the largest energy of a run is measured by, with the potential of gravity from
-    its value at the start [J].
+    """Return T + V, that in barriers, and what the largest energy of a run is measured by, with the potential of
+    gravity from its value at the start [J].
     """
     kinetic = _kinetic(p, state, at)
     potential = size = rounding = 0.0

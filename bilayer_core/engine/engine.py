@@ -268,7 +268,7 @@ class Engine:
 
 
 def new_inputs(model: Model, sizes: dict[str, int], ends: int) -> StageInputs:
-    """Arrays for what acts at so many ends of stages, with prescribed bodies at the start of their paths."""
+    """Return the arrays for what acts at so many ends of stages, with prescribed bodies at the start of their paths."""
     inputs = StageInputs.zeros(sizes | {"stage end": ends})
     for b in np.flatnonzero(model.free_bodies.free_index[:-1] < 0):
         inputs.position[:, b], inputs.rotation[:, b] = model.bodies.start_position[b], model.bodies.start_rotation[b]

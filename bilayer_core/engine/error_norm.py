@@ -47,7 +47,7 @@ class ErrorNorm:
 
 @piece(float, ErrorNorm, StateArrays, StateArrays, float)
 def step_defect(norm, before, after, h):
-    """D of a step over the length of the longest rod; times `Method.estimate` its local error.
+    """Return D of a step over the length of the longest rod; times `Method.estimate` its local error.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def step_defect(norm, before, after, h):
 
 @kernel
 def fastest(norm, state):
-    """Largest speed of a node, or of the outermost point of a free body [m/s]."""
+    """Return the largest speed of a node, or of the outermost point of a free body [m/s]."""
     largest = 0.0
     for i in range(state.velocity.shape[0]):
         square = 0.0
@@ -134,7 +134,7 @@ def _of_edges(half_width, weight, before, after, half, first, last, strand):
 
 @kernel
 def _of_body(bounding_radius, before, after, half, b):
-    """D of the outermost point of a body [m]."""
+    """Return D of the outermost point of a body [m]."""
     turn = rotation_vector_between(before.body_rotation, b, after.body_rotation, b)
     shifted = turned = 0.0
     for k in range(3):

@@ -67,13 +67,15 @@ def evaluate_laws(p, work, at):
 
 @piece(float, Problem, Stage)
 def speed_of_step(p, stage):
-    """Largest displacement of a material point in the step in `System` over the length of the stage [m/s]."""
+    """Return the largest displacement of a material point in the step in `System` over the length of the stage
+    [m/s].
+    """
     return correction_speed(p.strands, p.bodies, p.system, stage.length)
 
 
 @piece(int, Problem, Configuration, Stage)
 def bound_step(p, at, stage):
-    """How far the step in `System` may go; the slip of its contacts is left in `Slips`.
+    """Return how far the step in `System` may go; the slip of its contacts is left in `Slips`.
 
     Returns
     -------

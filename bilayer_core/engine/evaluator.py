@@ -132,14 +132,14 @@ class Evaluator:
     # stages
 
     def rest_strains_of(self, transduction: Array) -> RestStrains:
-        """Strains without stress from the stimuli that materials have reached, shape (n_law,)."""
+        """Return the strains without stress from the stimuli that materials have reached, shape (n_law,)."""
         self._state.transduction[:] = transduction
         write_rest_strains(self.problem, self._arrays, self._work)
         stage = self.stage
         return RestStrains(stage.rest_edge.copy(), stage.rest_joint.copy(), self._work.strain.copy())
 
     def start_point(self, state: State, at: Configuration) -> Point:
-        """Positions and momenta at the start of a step from a state, whose configuration is `at`."""
+        """Return the positions and momenta at the start of a step from a state, whose configuration is `at`."""
         self._take(state)
         start_step_point(self.problem, self._arrays, at, self.point)
         return self.point
@@ -220,16 +220,16 @@ class Evaluator:
         start_elements(0, self.problem, at, self.stage)
 
     def forces(self, at: Configuration, forces: Iterable[str] | None = None) -> dict[str, float]:
-        """Energies [J] of all forces or of some by name; `sums` holds their derivatives by nodes, edges, pairs, and
-        free bodies, of which nothing has been handed on to the unknowns.
+        """Return the energies [J] of all forces or of some by name; `sums` holds their derivatives by nodes, edges,
+        pairs, and free bodies, of which nothing has been handed on to the unknowns.
         """
         return self._evaluate(at, forces, second=False, expands=False)
 
     def evaluate(
         self, at: Configuration, forces: Iterable[str] | None = None, second: bool = False
     ) -> dict[str, float]:
-        """Energies [J] of all forces or of some by name; their derivatives by the unknowns and by free bodies are in
-        `sums`, with `second` those for `assemble` as well.
+        """Return the energies [J] of all forces or of some by name; their derivatives by the unknowns and by free
+        bodies are in `sums`, with `second` those for `assemble` as well.
         """
         return self._evaluate(at, forces, second=second, expands=True)
 
@@ -296,8 +296,8 @@ class Evaluator:
         return outcome.shift, outcome.simplified
 
     def newton_step(self, gradient: Array, body_gradient: Array) -> tuple[Array, Array]:
-        """Minus the inverse of the factorised matrix times a gradient: of unknowns, shape (size,), and of free bodies,
-        shape (n_free, 6), both in space.
+        """Return minus the inverse of the factorised matrix times a gradient: of unknowns, shape (size,), and of free
+        bodies, shape (n_free, 6), both in space.
         """
         problem = self.problem
         self.sums.gradient[:], self.sums.body[:] = gradient, body_gradient
@@ -305,12 +305,12 @@ class Evaluator:
         return problem.system.step.copy(), problem.system.body_step.copy()
 
     def speed(self, step: Array, body_step: Array) -> float:
-        """Largest displacement of a material point in a step over the length of the stage [m/s]."""
+        """Return the largest displacement of a material point in a step over the length of the stage [m/s]."""
         self._put(step, body_step)
         return speed_of_step(self.problem, self.stage)
 
     def bound(self, at: Configuration, step: Array, body_step: Array) -> StepBound:
-        """How far a step may go from the configuration of the last evaluation."""
+        """Return how far a step may go from the configuration of the last evaluation."""
         self._put(step, body_step)
         status = bound_step(self.problem, at, self.stage)
         if status != READY:

@@ -185,7 +185,9 @@ def _has_to_start(run, h):
 
 @kernel
 def _shortest(run, begin):
-    """Length of the shortest step from `begin` [s], the less the faster something was or the last attempt made it."""
+    """Return the length of the shortest step from `begin` [s], the less the faster something was or the last attempt
+    made it.
+    """
     control, norm = run.control, run.error_norm
     speed = max(fastest(norm, run.start_state), fastest(norm, run.state))
     if control.least_travel >= control.shortest * speed:

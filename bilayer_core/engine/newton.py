@@ -53,7 +53,7 @@ ROUNDING = 1e-13  # of the sum of the terms' magnitudes: differences of the pote
 
 @kernel
 def largest_move(step, node_unknown, edge_unknown, half_width):
-    """Largest displacement of a node, or of an edge's border by its turn [m]; NaN if any is."""
+    """Return the largest displacement of a node, or of an edge's border by its turn [m]; NaN if any is."""
     largest, total = 0.0, 0.0
     for i in range(node_unknown.shape[0]):
         d = node_unknown[i]
@@ -70,7 +70,9 @@ def largest_move(step, node_unknown, edge_unknown, half_width):
 
 @kernel
 def correction_speed(strands, bodies, system, length):
-    """Largest displacement of a material point in the present step over a length of time [m/s]; NaN if any is."""
+    """Return the largest displacement of a material point in the present step over a length of time [m/s]; NaN if any
+    is.
+    """
     largest = largest_move(system.step, strands.node_unknown, strands.edge_unknown, strands.half_width)
     for f in range(bodies.mass.shape[0]):
         shift, turn = 0.0, 0.0
@@ -86,7 +88,8 @@ def correction_speed(strands, bodies, system, length):
 
 @kernel
 def rounding_speed(at, length):
-    """Speed of a correction that moves the node farthest out by a few of its last digits over a length of time [m/s].
+    """Return the speed of a correction that moves the node farthest out by a few of its last digits over a length of
+    time [m/s].
 
     Elasticity sees positions no better than that, so Newton cannot do better where it outweighs inertia.
     """
@@ -103,8 +106,8 @@ LAST_DIGITS = 4.0 * 2.0**-52
 
 @piece(float, Problem, Configuration)
 def bound(p, at):
-    """Largest fraction of `System.node_step`, `System.angle_step` and `System.motion` that keeps all gaps open; the
-    near pair that sets it (−1: none), and whether that could be found, are left in `Outcome`.
+    """Return the largest fraction of `System.node_step`, `System.angle_step` and `System.motion` that keeps all gaps
+    open; the near pair that sets it (−1: none), and whether that could be found, are left in `Outcome`.
     """
     _move_constrained(p.constrained, p.system, at)
     outcome = p.outcome
@@ -351,7 +354,9 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
 
 @kernel
 def _least_gap_of_rods(rods):
-    """Gap above which contacts of rods are not counted, in motions of nodes [m]; infinite where rods cannot meet."""
+    """Return the gap above which contacts of rods are not counted, in motions of nodes [m]; infinite where rods cannot
+    meet.
+    """
     if not rods.exists:
         return math.inf
     return rods.d_hat / rods.rails.factor if rods.rails.exists else rods.d_hat
@@ -359,8 +364,8 @@ def _least_gap_of_rods(rods):
 
 @kernel
 def predicted_decrease(strands, bodies, sums, system):
-    """Slope of the potential along the present step, and the difference below which its values mean nothing [J]; the
-    motion of nodes and bodies is left for the bound.
+    """Return the slope of the potential along the present step, and the difference below which its values mean nothing
+    [J]; the motion of nodes and bodies is left for the bound.
     """
     slope, noise = 0.0, 0.0
     for j in range(system.step.shape[0]):

@@ -212,7 +212,9 @@ def observables_of(
 
 
 def _tables_of(model: Model) -> dict[str, Array]:
-    """Nodes of strands with their edges, free ends with their neighbours, and nodes that stand for others."""
+    """Return the nodes of strands with their edges, free ends with their neighbours, and nodes that stand for
+    others.
+    """
     nodes, edges, ends, shut = [], [], [], []
     for s in model.strands:
         first, last = s.first_node, s.first_node + s.node_count - 1

@@ -68,7 +68,8 @@ def end_forces(p, at, stage):
 
 @kernel
 def evaluate(p, at, stage, with_hessian, again):
-    """Potential at a configuration [J], infinite behind a surface, and the smallest gap to a surface or a rod [m].
+    """Return the potential at a configuration [J], infinite behind a surface, and the smallest gap to a surface or a
+    rod [m].
 
     Gradients always, second derivatives on request, are left in `Sums`. The contacts of rods are those found last. With
     `again` the configuration is that of the last evaluation; only what `update_lagged` has changed since is found anew,
@@ -84,8 +85,8 @@ def evaluate(p, at, stage, with_hessian, again):
 
 @piece(float, Problem, Configuration, Stage, bool, bool)
 def add_forces(p, at, stage, with_hessian, again):
-    """Energies and first derivatives by nodes, edges, pairs and bodies, second ones on request; parameters as for
-    `evaluate`. Returns the smallest gap [m].
+    """Add the energies and first derivatives by nodes, edges, pairs and bodies, second ones on request; parameters
+    as for `evaluate`. Returns the smallest gap [m].
     """
     forces, sums = p.forces, p.sums
     count, gap = forces.add.shape[0], math.inf
@@ -110,7 +111,7 @@ def add_forces(p, at, stage, with_hessian, again):
 
 @piece(int, Problem, Configuration)
 def expand_to_unknowns(p, at):
-    """First derivatives from nodes, edges, pairs and bodies to the unknowns."""
+    """Hand first derivatives on from nodes, edges, pairs and bodies to the unknowns."""
     expand_gradient(p.bonds, p.strands, p.sums)
     condense_gradient(p.constrained, p.strands, at, p.sums)
     return READY

@@ -46,14 +46,14 @@ def write_forces_of_laws(p, at, stage, force_out):
 
 @kernel
 def in_barriers(p):
-    """Energy in what stops impacts: barriers, and limits of hinges and slides [J]."""
+    """Return the energy in what stops impacts: barriers, and limits of hinges and slides [J]."""
     energy = p.sums.energy[BARRIER] + p.sums.energy[ROD_BARRIER]
     return energy + p.mechanisms.in_limits[0] if p.mechanisms.exists else energy
 
 
 @kernel
 def _turning_power(gradient, b, rates):
-    """∂Φ/∂(X, φ)·(V, ω)"""
+    """Return ∂Φ/∂(X, φ)·(V, ω)"""
     power = 0.0
     for c in range(6):
         power += gradient[b, c] * rates[b, c]

@@ -37,7 +37,7 @@ SPIN_CHANGE = 1e-15
 
 @kernel
 def _tensor_times(second_moment, f, rotation, b, x, y, z, scratch):
-    """I ω of free body f at rotation[b], as a tuple."""
+    """Return I ω of free body f at rotation[b], as a tuple."""
     inertia_tensor(second_moment, f, rotation, b, scratch)
     return (
         scratch[0, 0] * x + scratch[0, 1] * y + scratch[0, 2] * z,
@@ -147,7 +147,7 @@ def add_history_to_origin(p, state, work, method, n, h):
 
 @kernel
 def _spin_without_moment(second_moment, f, rotation, b, momentum, length, turned, scratch):
-    """ω̃ with I(exp(length ω̃) R̄) ω̃ = L̄ [rad/s], by iteration; exp(length ω̃) R̄ is left in turned[f]."""
+    """Return ω̃ with I(exp(length ω̃) R̄) ω̃ = L̄ [rad/s], by iteration; exp(length ω̃) R̄ is left in turned[f]."""
     x = y = z = 0.0
     copy_matrix(rotation, b, turned, f)
     if momentum[f, 0] == 0.0 and momentum[f, 1] == 0.0 and momentum[f, 2] == 0.0:

@@ -236,7 +236,7 @@ def keep_stage_derivatives(state, origin, end, momentum_length, carry):
 
 @piece(float, Problem, Configuration, Configuration)
 def distance(p, start, end):
-    """Largest displacement of a material point from one configuration to another [m]."""
+    """Return the largest displacement of a material point from one configuration to another [m]."""
     bodies, strands, largest = p.bodies, p.strands, 0.0
     for i in range(start.position.shape[0]):
         square = 0.0

@@ -89,7 +89,7 @@ class IntegrationReport:
     regularised: int = 0
 
     def followed_by(self, more: IntegrationReport) -> IntegrationReport:
-        """Both together; it ends as `more` does."""
+        """Return both together; it ends as `more` does."""
         if not more.done:
             more = replace(more, shortest=self.shortest, longest=self.longest)
         return replace(

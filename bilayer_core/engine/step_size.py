@@ -36,7 +36,7 @@ NUMBER_ROUNDING = 4.0 * sys.float_info.epsilon
 
 @kernel
 def after_success(order, h, error, error_before, iterations, shortened):
-    """Length of the step after one that was accepted [s].
+    """Return the length of the step after one that was accepted [s].
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def after_success(order, h, error, error_before, iterations, shortened):
 
 @kernel
 def after_rejection(order, h, error):
-    """Length of the next attempt after one whose error, as a part of the tolerance, exceeds 1 [s]."""
+    """Return the length of the next attempt after one whose error, as a part of the tolerance, exceeds 1 [s]."""
     return h * max(SAFETY * error ** (-1.0 / (order + 1)), SMALLEST_FACTOR)
 
 
@@ -75,7 +75,7 @@ def fit(h, left):
 
 @exact_kernel
 def completed(time, rate):
-    """Periods of `rate` [1/s] from time 0 to `time` [s]; one that ends now is complete."""
+    """Return the periods of `rate` [1/s] from time 0 to `time` [s]; one that ends now is complete."""
     periods = time * rate
     return math.floor(periods + PERIOD_ROUNDING + NUMBER_ROUNDING * abs(periods))
 

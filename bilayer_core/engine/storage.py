@@ -138,7 +138,7 @@ class Storage:
         return Problem(**records, outcome=self.outcome, forces=force_table(model, records))
 
     def _surfaces(self, sizes: dict[str, int]) -> Surfaces:
-        """Points and surfaces, without a list of those that are near each other yet."""
+        """Return the points and surfaces, without a list of those that are near each other yet."""
         stiffness = self._model.contact_stiffness
         return self._model.surfaces.allocated(sizes, stiffness=stiffness, margin=np.full(1, -1.0))
 
@@ -223,7 +223,9 @@ def _take_over(old: Sliding | RodContactList, new: Sliding | RodContactList, cou
 
 
 def new_configuration(model: Model, sizes: dict[str, int]) -> Configuration:
-    """Arrays of a configuration, of which everything that does not move is in place; `sizes` as in `model.sizes`."""
+    """Return the arrays of a configuration, of which everything that does not move is in place; `sizes` as in
+    `model.sizes`.
+    """
     surfaces = model.surfaces
     nodes = model.node_count
     contact_point = np.zeros((nodes + sizes["point"], 3))
@@ -241,7 +243,7 @@ def new_configuration(model: Model, sizes: dict[str, int]) -> Configuration:
 
 
 def new_points(sizes: dict[str, int], count: int) -> list[Point]:
-    """Arrays of so many points."""
+    """Return the arrays of so many points."""
     shapes = shapes_of(Point, sizes, [name for name in Point.shapes if name != "rotation"])
     in_one = [zeros_in_one(shapes) for _ in range(count)]
     return [Point.zeros(sizes, vectors=vectors, **parts) for vectors, parts in in_one]

@@ -95,7 +95,7 @@ TWO_PI = 2.0 * math.pi
 
 @kernel
 def bending_strain(at, a, b):
-    """κ₁ between edges a and b of a configuration as it is: that in `joint_strain` is from before Newton's last
+    """Return κ₁ between edges a and b of a configuration as it is: that in `joint_strain` is from before Newton's last
     correction.
     """
     tangent_a, tangent_b = row(at.tangent, a), row(at.tangent, b)

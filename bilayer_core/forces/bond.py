@@ -109,7 +109,7 @@ def _curvature_on_frame(edge, pair, p, q1, q2, q3, length, t, m1, m2, edge_hessi
 
 @kernel
 def _strain_gradients(weight, p, length, t, m1, m2):
-    """∂(w p·m_α)/∂ε for α = 1, 2, 3 and ∂/∂θ for α = 1, 2 of one edge of weight w."""
+    """Return ∂(w p·m_α)/∂ε for α = 1, 2, 3 and ∂/∂θ for α = 1, 2 of one edge of weight w."""
     factor = weight / length
     pt = dot(p, t)
     return (

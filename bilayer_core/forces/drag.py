@@ -42,7 +42,7 @@ def node_directions(before, after, at):
 
 @kernel
 def mixed_directions(before, part_before, after, part_after, at):
-    """Directions t, m1, m2 that are mixed of those of two edges, orthonormal."""
+    """Return the directions t, m1, m2 that are mixed of those of two edges, orthonormal."""
     t = combine(part_before, row(at.tangent, before), part_after, row(at.tangent, after))
     t = scaled(1.0 / math.sqrt(dot(t, t)), t)
     m = combine(part_before, row(at.director1, before), part_after, row(at.director1, after))

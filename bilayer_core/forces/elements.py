@@ -30,7 +30,7 @@ def acts_viscously(p):
 
 @kernel
 def strains_of_pair(strands, bonds, at, k):
-    """Components of the vector between two layers along the frames of its two edges; see `forces.bond`."""
+    """Return the components of the vector between two layers along the frames of its two edges; see `forces.bond`."""
     x, position, node = bonds.joint[k], at.position, bonds.node
     a, b, wa, wb = strands.joint_a[x], strands.joint_b[x], bonds.weight[k, 0], bonds.weight[k, 1]
     above = combine(0.5, row(position, node[k, 0]), 0.5, row(position, node[k, 1]))

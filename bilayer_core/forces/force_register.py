@@ -168,7 +168,7 @@ def _carried(term: Term, model: Model) -> int:
 
 
 def memory_size(model: Model) -> int:
-    """How many values the forces of a model carry from step to step (`Problem.memory`)."""
+    """Return how many values the forces of a model carry from step to step (`Problem.memory`)."""
     return sum(_carried(term, model) for term in TERMS)
 
 

@@ -35,7 +35,7 @@ MAX_HALVINGS = 50
 
 @kernel
 def _dissipated(count, path, fraction):
-    """Σ D′(α) and Σ D″(α) [J]"""
+    """Return Σ D′(α) and Σ D″(α) [J]"""
     first, second = 0.0, 0.0
     for k in range(count):
         forward, side = path[k, 0] + fraction * path[k, 1], path[k, 2] + fraction * path[k, 3]
@@ -54,7 +54,7 @@ def _dissipated(count, path, fraction):
 
 @kernel
 def friction_limit(count, path, slope, bound):
-    """Fraction of a step, at most `bound`, after which friction stops it.
+    """Return the fraction of a step, at most `bound`, after which friction stops it.
 
     Parameters
     ----------
@@ -84,7 +84,9 @@ def friction_limit(count, path, slope, bound):
 
 @piece(float, Problem, Configuration, Stage, float, float)
 def limit_by_friction(p, at, stage, slope, bound):
-    """`friction_limit` of the present step by all contacts; the matrix that it was solved with is that of `at`."""
+    """Return `friction_limit` of the present step by all contacts; the matrix that it was solved with is that
+    of `at`.
+    """
     slips, sliding, system, count = p.slips, p.sliding, p.system, 0
     if sliding.exists:
         count = sliding.count[0]

@@ -85,7 +85,7 @@ def second_moment_beyond(second_moment, f, reference_rotation, turned, s_out, n_
 
 @kernel
 def moment_of_rotation(second_moment, f, reference_rotation, turned):
-    """ax(A) [kg m²] of free body f, as a tuple; parameters as for `second_moment_beyond`."""
+    """Return ax(A) [kg m²] of free body f, as a tuple; parameters as for `second_moment_beyond`."""
     s, n, a = stack_matrix(3, 3), stack_matrix(3, 3), stack_matrix(3, 3)
     second_moment_beyond(second_moment, f, reference_rotation, turned, s, n, a)
     return a[2, 1] - a[1, 2], a[0, 2] - a[2, 0], a[1, 0] - a[0, 1]

@@ -138,7 +138,7 @@ def _add_crossing(stiffness, u, v, with_hessian, own, k, hessian):
 
 @piece(float, Joints, Problem, Configuration, Stage, bool)
 def add_joints(joints, p, at, stage, with_hessian):
-    """Energy and derivatives of all joints."""
+    """Add the energy and derivatives of all joints."""
     sums, total, own, apart = p.sums, 0.0, joints.gradient, joints.apart
     own[:] = 0.0
     if not sums.selected[JOINTS]:

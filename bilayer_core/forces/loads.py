@@ -108,7 +108,7 @@ def start_dead_loads(loads, p, start, stage):
 
 @piece(bool, PointForces, Problem, Configuration, Stage)
 def update_followers(loads, p, at, stage):
-    """Followers take their directions from a configuration; whether there are any."""
+    """Let followers take their directions from a configuration; returns whether there are any."""
     node, body = loads.node, loads.body
     for k in range(node.shape[0]):
         factor, v = stage.load_factor[loads.node_load[k]], loads.node_vector
@@ -125,7 +125,7 @@ def update_followers(loads, p, at, stage):
 
 @kernel
 def _power_of_moment(moment, k, rotation, stage, body, b):
-    """M·ω [W] with [ω]× = (R − R̄) Rᵀ/(γ h), its antisymmetric part."""
+    """Return M·ω [W] with [ω]× = (R − R̄) Rᵀ/(γ h), its antisymmetric part."""
     power = 0.0
     for c in range(3):
         i, j = (c + 1) % 3, (c + 2) % 3
@@ -176,7 +176,7 @@ def add_moments(moments, p, at, stage, with_hessian):
 
 @piece(bool, Moments, Problem, Configuration, Stage)
 def update_moments(moments, p, at, stage):
-    """Moments by their factors, those that follow in the axes of their bodies; whether any does."""
+    """Return the moments by their factors, those that follow in the axes of their bodies; whether any does."""
     body, dead = moments.body, moments.dead
     for k in range(body.shape[0]):
         factor = stage.load_factor[moments.load[k]]

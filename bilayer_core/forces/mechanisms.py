@@ -61,7 +61,7 @@ BOUNDLESS = 1e300
 
 @kernel
 def turned(rotation, b, local, k):
-    """R r of a body, as a tuple."""
+    """Return R r of a body, as a tuple."""
     x, y, z = local[k, 0], local[k, 1], local[k, 2]
     return (
         rotation[b, 0, 0] * x + rotation[b, 0, 1] * y + rotation[b, 0, 2] * z,
@@ -72,7 +72,7 @@ def turned(rotation, b, local, k):
 
 @kernel
 def _value(mechanisms, at, k, before):
-    """q, with the whole turns nearest to a value before."""
+    """Return q, with the whole turns nearest to a value before."""
     a, b = mechanisms.body[2 * k], mechanisms.body[2 * k + 1]
     axis = turned(at.rotation, a, mechanisms.axis, k)
     if mechanisms.slides[k]:
@@ -199,7 +199,7 @@ def add_way(at, a, b, axis, arm, slope, slope_of_slope, with_hessian, gradient, 
 
 @kernel
 def limit_energy(beyond, stiffness, margin):
-    """W(x), W′ and W″ of a limit."""
+    """Return W(x), W′ and W″ of a limit."""
     if beyond <= 0.0:
         return 0.0, 0.0, 0.0
     if beyond < margin:
@@ -211,7 +211,7 @@ def limit_energy(beyond, stiffness, margin):
 
 @piece(float, Mechanisms, Problem, Configuration, Stage, bool)
 def add_mechanisms(mechanisms, p, at, stage, with_hessian):
-    """Energy and derivatives of springs, limits, damping and friction."""
+    """Add the energy and derivatives of springs, limits, damping and friction."""
     sums, h, own = p.sums, stage.length, mechanisms.gradient
     own[:] = 0.0
     mechanisms.in_limits[0], mechanisms.limit_slope[:] = 0.0, 0.0

@@ -29,7 +29,7 @@ def _share(rails, i):
 
 @kernel
 def _first(strands, i, e):
-    """First column of an edge in the rate of a rail."""
+    """Return the first column of an edge in the rate of a rail."""
     return 4 if strands.edge_node[e] == i else 0
 
 
@@ -74,7 +74,9 @@ def hand_on(rails, strands, gradient, rate, node_out, edge_out):
 
 @kernel
 def arm_motion(rails, strands, rate, node_vectors, angles, i, c):
-    """Component c of what the arm of a rail with a height moves by, at first order, with its nodes and edges."""
+    """Return the component c of what the arm of a rail with a height moves by, at first order, with its nodes and
+    edges.
+    """
     moved = 0.0
     _, count = _share(rails, i)
     for side in range(count):

@@ -43,7 +43,7 @@ LARGEST_DAMPING = 100.0
 
 
 def damping_of(restitution: float) -> float:
-    """z of a coefficient of restitution."""
+    """Return z of a coefficient of restitution."""
     if restitution * LARGEST_DAMPING <= 1.0:
         return LARGEST_DAMPING
     if restitution >= 1.0:
@@ -65,7 +65,8 @@ def with_memory(restitution: Restitution, first: int) -> Restitution:
 
 @kernel
 def integral_of_barrier(d, d_hat):
-    """B(d) = ∫ b from d̂ to d [m³], with y = 1 − d/d̂: d̂³ ∫ y² ln(1 − y) dy = −d̂³ Σ y^(k+3)/(k (k + 3)), k ≥ 1.
+    """Return B(d) = ∫ b from d̂ to d [m³], with y = 1 − d/d̂: d̂³ ∫ y² ln(1 − y) dy = −d̂³ Σ y^(k+3)/(k (k + 3)), k ≥
+    1.
 
     In closed form that is a difference of order y⁴ between terms of order y: for small y the sum keeps its digits.
     """
@@ -81,8 +82,8 @@ def integral_of_barrier(d, d_hat):
 
 @kernel
 def damping_at(p, stage, i, s, d):
-    """Damping of contact point i on surface s at a gap d: the part of the elastic force that it takes, β [1/m], 0 where
-    that part is the most, and D [m²].
+    """Return the damping of contact point i on surface s at a gap d: the part of the elastic force that it takes, β
+    [1/m], 0 where that part is the most, and D [m²].
     """
     restitution = p.restitution
     row = restitution.row[i, s]

@@ -27,7 +27,7 @@ from bilayer_core.kinematics.vector import cross, dot, row
 
 @kernel
 def material_arm(at, k, along1, along2):
-    """A_e of an arm by its parts along m1 and m2, as a tuple."""
+    """Return A_e of an arm by its parts along m1 and m2, as a tuple."""
     m1, m2 = row(at.director1, k), row(at.director2, k)
     return along1 * m1[0] + along2 * m2[0], along1 * m1[1] + along2 * m2[1], along1 * m1[2] + along2 * m2[2]
 

@@ -99,7 +99,7 @@ def find_rod_contacts(p, at):
 
 @piece(float, Problem, Configuration)
 def bound_between_rods(p, at):
-    """Largest fraction of `System.node_step` that keeps rods apart; the status is left in `Outcome`."""
+    """Return the largest fraction of `System.node_step` that keeps rods apart; the status is left in `Outcome`."""
     rods, step, outcome = p.rod_contact, p.system.node_step, p.outcome
     outcome.status = READY
     rails, place = rods.rails, at.position
@@ -166,7 +166,7 @@ def settle_rod_friction(rods, p, at, stage):
 
 @piece(float, RodContact, Problem, Configuration, Stage, bool)
 def add_rod_barrier(rods, p, at, stage, with_hessian):
-    """Barrier at the contacts found last; returns the smallest gap below the barrier distance [m]."""
+    """Add the barrier at the contacts found last; returns the smallest gap below the barrier distance [m]."""
     sums = p.sums
     if rods.contacts.count[0] > 0 and sums.selected[ROD_BARRIER]:
         rails = rods.rails
@@ -184,7 +184,7 @@ def add_rod_barrier(rods, p, at, stage, with_hessian):
 
 @piece(float, RodContact, Problem, Configuration, Stage, bool)
 def add_rod_friction(rods, p, at, stage, with_hessian):
-    """Friction at the contacts frozen last; returns infinity, as it knows no gap."""
+    """Add the friction at the contacts frozen last; returns infinity, as it knows no gap."""
     sums, energy, lost = p.sums, 0.0, 0.0
     if rods.sliding.count[0] > 0 and sums.selected[ROD_FRICTION]:
         rails = rods.rails
@@ -250,7 +250,7 @@ def _add_barrier(rods, position, gradient):
 
 @kernel
 def _moved(vectors, origin, contacts, c, m):
-    """Component m of Σ w_m (x_m − x_m⁰) at a contact [m]."""
+    """Return the component m of Σ w_m (x_m − x_m⁰) at a contact [m]."""
     i, j, weight = contacts.node[c, 0], contacts.node[c, 1], contacts.weight
     return (
         weight[c, 0] * (vectors[i, m] - origin[i, m])

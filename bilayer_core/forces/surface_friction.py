@@ -139,7 +139,7 @@ def _axis_of_grain(sliding, at, i, s, a, b):
 
 @kernel
 def _turned(rotation, b, x, y, z, sign):
-    """± rotation[b] (x, y, z)"""
+    """Return ± rotation[b] (x, y, z)"""
     return (
         sign * (rotation[b, 0, 0] * x + rotation[b, 0, 1] * y + rotation[b, 0, 2] * z),
         sign * (rotation[b, 1, 0] * x + rotation[b, 1, 1] * y + rotation[b, 1, 2] * z),
@@ -380,8 +380,8 @@ def _tangential_slip(sliding, p, at, stage, k, arm, lever, slip_out):
 
 @kernel
 def _change(u, v, stuck):
-    """Difference of the slips of two stations [m], and whether what is between them or close by slips less than
-    `stuck`, or than from place to place; not if it is so small that friction hardly differs.
+    """Return the difference of the slips of two stations [m], and whether what is between them or close by slips less
+    than `stuck`, or than from place to place; not if it is so small that friction hardly differs.
     """
     change = along = first = 0.0
     for c in range(3):

@@ -41,8 +41,8 @@ def list_surface_pairs(surfaces, at, motion):
 
 @piece(float, Problem, Configuration)
 def bound_at_surfaces(p, at):
-    """Largest fraction of the present step that keeps gaps to surfaces open; the near pair that sets it (−1: none) and
-    a status are left in `Outcome`.
+    """Return the largest fraction of the present step that keeps gaps to surfaces open; the near pair that sets it (−1:
+    none) and a status are left in `Outcome`.
     """
     surfaces, outcome = p.surfaces, p.outcome
     of_points = motion_of_points(surfaces, p.bodies, p.strands, p.system, at)

@@ -129,5 +129,5 @@ class Method:
 
 
 def estimate_of(error: float) -> float:
-    """`Method.estimate` of a method of order 2 whose positions have the local error `error` × h³ q⃛."""
+    """Return `Method.estimate` of a method of order 2 whose positions have the local error `error` × h³ q⃛."""
     return abs(error / (error - 1.0 / 12.0))

@@ -56,5 +56,5 @@ def kernel(function):
 
 
 def exact_kernel(function):
-    """`kernel` without reordered arithmetic."""
+    """Return `kernel` without reordered arithmetic."""
     return Kernel(function, EXACT)

@@ -300,7 +300,7 @@ def _block(declared: type[Record], names: tuple[str, ...], sizes: tuple[int, ...
 
 @lru_cache(maxsize=1024)
 def _sizes_in(declared: type[Record], names: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of sizes in the shapes of some fields."""
+    """Return the names of sizes in the shapes of some fields."""
     parts = (part for name in names for part in declared.shapes[name])
     return tuple(dict.fromkeys(part for part in parts if isinstance(part, str)))
 

@@ -11,7 +11,7 @@ from bilayer_core.jit.kernel import exact_kernel
 
 @exact_kernel
 def add_exactly(value, low, increment):
-    """(x, r) with x + r = value + low + increment, x the nearest number to it, as a tuple.
+    """Return (x, r) with x + r = value + low + increment, x the nearest number to it, as a tuple.
 
     Knuth's two-sum (The Art of Computer Programming 2, 4.2.2): what rounding cuts off value + (increment + low) is
     found exactly. Only `increment + low` is rounded itself, by a part of the increment or of r.

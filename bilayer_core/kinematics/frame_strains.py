@@ -8,7 +8,9 @@ Array = np.ndarray
 
 
 def cross(first: Array, second: Array) -> Array:
-    """Vector products of rows, shape (n, 3); `numpy.cross` has the same bits, in three times the time for few rows."""
+    """Return the vector products of rows, shape (n, 3); `numpy.cross` has the same bits, in three times the time for
+    few rows.
+    """
     a, b, c = first.T
     x, y, z = second.T
     product = np.empty_like(first)
@@ -19,7 +21,7 @@ def cross(first: Array, second: Array) -> Array:
 
 
 def rest_strains(tangent_a: Array, m1_a: Array, tangent_b: Array, m1_b: Array) -> Array:
-    """κ₁, κ₂, ψ [rad] between edges a and b (see `forces.bend_twist`), shape (n, 3)."""
+    """Return κ₁, κ₂, ψ [rad] between edges a and b (see `forces.bend_twist`), shape (n, 3)."""
 
     def dot(u: Array, v: Array) -> Array:
         return np.einsum("ij,ij->i", u, v)

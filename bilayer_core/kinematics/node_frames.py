@@ -51,7 +51,7 @@ def frames_at_nodes(of):
 
 @kernel
 def _unit(a):
-    """a/|a|"""
+    """Return a/|a|"""
     return scaled(1.0 / np.sqrt(dot(a, a)), a)
 
 

@@ -35,7 +35,7 @@ def rotate_by(v0, v1, v2, matrix, b, out, c):
 
 @kernel
 def rotation_vector_between(first, a, last, b):
-    """Rotation vector [rad] of last[b] first[a]ᵀ, by less than half a turn, as a tuple."""
+    """Return the rotation vector [rad] of last[b] first[a]ᵀ, by less than half a turn, as a tuple."""
     q00 = q11 = q22 = q21 = q12 = q02 = q20 = q10 = q01 = 0.0
     for k in range(3):
         q00 += last[b, 0, k] * first[a, 0, k]
@@ -83,8 +83,8 @@ def real_part(turned, f):
 
 @kernel
 def rotated_by(turned, f, u0, u1, u2):
-    """(E − 1) u = 2 w q×u + 2 q×(q×u) for the rotation E of the quaternion with the vector part q = turned[f], as a
-    tuple.
+    """Return (E − 1) u = 2 w q×u + 2 q×(q×u) for the rotation E of the quaternion with the vector part q = turned[f],
+    as a tuple.
     """
     q0, q1, q2 = turned[f, 0], turned[f, 1], turned[f, 2]
     w = real_part(turned, f)
@@ -98,7 +98,7 @@ def rotated_by(turned, f, u0, u1, u2):
 
 @kernel
 def spin_of(v0, v1, v2, u0, u1, u2):
-    """Angular velocity of exp([v]×) while v changes at the rate u, as a tuple; see `kinematics.rotation`."""
+    """Return the angular velocity of exp([v]×) while v changes at the rate u, as a tuple; see `kinematics.rotation`."""
     angle2 = v0 * v0 + v1 * v1 + v2 * v2
     if angle2 < 1e-8:
         a, b = 0.5 - angle2 / 24.0, 1.0 / 6.0 - angle2 / 120.0
@@ -138,7 +138,7 @@ def inertia_tensor(second_moment, f, rotation, b, out):
 
 @kernel
 def solve_three(matrix, x, y, z):
-    """Solution of a regular 3 × 3 system by Cramer's rule, as a tuple."""
+    """Return the solution of a regular 3 × 3 system by Cramer's rule, as a tuple."""
     a, b, c = matrix[0, 0], matrix[0, 1], matrix[0, 2]
     d, e, f = matrix[1, 0], matrix[1, 1], matrix[1, 2]
     g, h, i = matrix[2, 0], matrix[2, 1], matrix[2, 2]

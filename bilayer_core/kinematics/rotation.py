@@ -8,13 +8,13 @@ import numpy as np
 
 
 def skew(vector: np.ndarray) -> np.ndarray:
-    """Matrix [v]× with [v]× u = v × u, shape (3, 3)."""
+    """Return the matrix [v]× with [v]× u = v × u, shape (3, 3)."""
     x, y, z = vector
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def rotation_matrix(vector: np.ndarray) -> np.ndarray:
-    """exp([v]×) of a rotation vector [rad] by Rodrigues' formula, shape (3, 3)."""
+    """Return exp([v]×) of a rotation vector [rad] by Rodrigues' formula, shape (3, 3)."""
     angle2 = float(vector @ vector)
     matrix = skew(vector)
     if angle2 < 1e-8:  # series to the rounding limit: the next terms are below 1e-17
@@ -26,8 +26,8 @@ def rotation_matrix(vector: np.ndarray) -> np.ndarray:
 
 
 def rotation_vector(matrix: np.ndarray) -> np.ndarray:
-    """Rotation vector [rad] of a rotation matrix by less than half a turn, the inverse of `rotation_matrix`, shape
-    (3,).
+    """Return the rotation vector [rad] of a rotation matrix by less than half a turn, the inverse of `rotation_matrix`,
+    shape (3,).
     """
     axis = 0.5 * np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
     sine, cosine = np.sqrt(axis @ axis), 0.5 * (np.trace(matrix) - 1.0)
@@ -37,7 +37,7 @@ def rotation_vector(matrix: np.ndarray) -> np.ndarray:
 
 
 def matrix_from_quaternion(quaternion: np.ndarray) -> np.ndarray:
-    """Rotation matrix of a unit quaternion x y z w, shape (3, 3)."""
+    """Return the rotation matrix of a unit quaternion x y z w, shape (3, 3)."""
     x, y, z, w = quaternion / np.linalg.norm(quaternion)
     return np.array(
         [
@@ -70,7 +70,7 @@ def quaternion_from_matrix(matrix: np.ndarray) -> np.ndarray:
 
 
 def quaternion_product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Quaternion x y z w of the rotation by `second` followed by that by `first`, shape (..., 4)."""
+    """Return the quaternion x y z w of the rotation by `second` followed by that by `first`, shape (..., 4)."""
     x, y, z, w = np.moveaxis(np.asarray(first, dtype=float), -1, 0)
     a, b, c, d = np.moveaxis(np.asarray(second, dtype=float), -1, 0)
     return np.stack(

@@ -18,7 +18,7 @@ def row(array, k):
 
 @kernel
 def dot(a, b):
-    """a·b"""
+    """Return a·b"""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
@@ -40,19 +40,19 @@ def angle(cosine, sine):
 
 @kernel
 def scaled(s, a):
-    """s a"""
+    """Return s a"""
     return s * a[0], s * a[1], s * a[2]
 
 
 @kernel
 def combine(s, a, t, b):
-    """s a + t b"""
+    """Return s a + t b"""
     return s * a[0] + t * b[0], s * a[1] + t * b[1], s * a[2] + t * b[2]
 
 
 @kernel
 def combine3(s, a, t, b, r, c):
-    """s a + t b + r c"""
+    """Return s a + t b + r c"""
     return s * a[0] + t * b[0] + r * c[0], s * a[1] + t * b[1] + r * c[1], s * a[2] + t * b[2] + r * c[2]
 
 

@@ -12,7 +12,7 @@ Array = np.ndarray
 
 
 def bend_faces(model: Model) -> tuple[Array, Array]:
-    """Heights of the two faces over the curve at each bend, and the thickness of the whole section there.
+    """Return the heights of the two faces over the curve at each bend, and the thickness of the whole section there.
 
     Returns
     -------

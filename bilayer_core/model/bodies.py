@@ -65,8 +65,8 @@ def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = Non
 def _bounding_radii(
     scene: SceneConfig, found: Collected, shapes: tuple[Shape | None, ...], free: list[int], moments: np.ndarray
 ) -> np.ndarray:
-    """Largest distance of what each body, and last the world, carries from its position [m]: nodes, points, surface; of
-    a free body without a surface at least its radius of gyration.
+    """Return the largest distance of what each body, and last the world, carries from its position [m]: nodes, points,
+    surface; of a free body without a surface at least its radius of gyration.
     """
     bounding_radius = np.zeros(len(shapes) + 1)
     for index, moment in zip(free, moments, strict=True):
@@ -95,7 +95,8 @@ def guided_motions(motion: Guided, motions: np.ndarray) -> np.ndarray:
 
 
 def _inertia_of_held(found: Collected, count: int) -> np.ndarray:
-    """Moments of inertia of the half edges that bodies hold [kg m²], in the bodies' axes, shape (n_body, 3, 3).
+    """Return the moments of inertia of the half edges that bodies hold [kg m²], in the bodies' axes, shape (n_body, 3,
+    3).
 
     A half edge of the length l and the mass m, with the moment I of its section along the tangent t, has about its end
 
@@ -134,7 +135,7 @@ def _moves_with_rods(body: Body) -> bool:
 
 
 def _second_moment(body: Body, shape: Shape | None, of_held: np.ndarray) -> np.ndarray:
-    """J = ½ tr(I) 1 − I of a free body [kg m²]; `of_held` is the inertia of the half edges that it holds.
+    """Return J = ½ tr(I) 1 − I of a free body [kg m²]; `of_held` is the inertia of the half edges that it holds.
 
     A guided body that does not turn has any I, and one on a hinge a moment about every axis that is its own about the
     hinge: so its angular momentum stays along that.

@@ -242,7 +242,7 @@ def _joins(node: np.ndarray, edge: np.ndarray, solved: Layout) -> Joins:
 
 
 def _sides(plane: ScenePlane, found: Collected, bodies: PlacedBodies) -> np.ndarray:
-    """Sign σ of m1 = σ normal × t of edges and clamp edges, shape (n_edge + n_clamp_edge,)."""
+    """Return the sign σ of m1 = σ normal × t of edges and clamp edges, shape (n_edge + n_clamp_edge,)."""
     rotation = bodies.start_rotation[found.column("attached_body", np.int64)]
     columns = [found.column(f"clamp_edge_{name}", width=3) for name in ("tangent", "director1")]
     clamp_edges = [np.einsum("kij,kj->ki", rotation, column) for column in columns]
@@ -254,7 +254,7 @@ def _sides(plane: ScenePlane, found: Collected, bodies: PlacedBodies) -> np.ndar
 
 
 def _resolve(numbers: np.ndarray, count: int) -> np.ndarray:
-    """Edges or joints; those after the first `count`, clamp edges or bonds, were entered as −1 − their own number
-    because `count` was not known then.
+    """Return the edges or joints; those after the first `count`, clamp edges or bonds, were entered as −1 − their own
+    number because `count` was not known then.
     """
     return np.where(numbers < 0, count - 1 - numbers, numbers)

@@ -46,14 +46,14 @@ RODS = Collider("rods", -1, "", Mobility.FREE)
 
 
 def mobility_of(body: Body) -> Mobility:
-    """How a body moves; one on a schedule that never leaves its place is fixed."""
+    """Return how a body moves; one on a schedule that never leaves its place is fixed."""
     if not isinstance(body.motion, Prescribed):
         return Mobility.FREE
     return Mobility.SCHEDULED if body.motion.moves else Mobility.FIXED
 
 
 def colliders(scene: SceneConfig) -> tuple[list[Collider], list[Collider]]:
-    """Bodies and obstacles."""
+    """Return the bodies and obstacles."""
     bodies = [
         Collider(body.name, index, body.surface.shape if body.surface else "", mobility_of(body))
         for index, body in enumerate(scene.bodies)

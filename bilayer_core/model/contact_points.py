@@ -173,7 +173,7 @@ def _node_part(edges: np.ndarray) -> np.ndarray:
 
 
 def _arm_factor(found: Collected, arm: np.ndarray, edges: np.ndarray, between: bool) -> float:
-    """How many times farther than nodes, and borders of edges by a turn, a contact point of a rod moves at most.
+    """Return how many times farther than nodes, and borders of edges by a turn, a contact point of a rod moves at most.
 
     Its arm [m], shape (n_rod_point,), turns with the edges next to it, shape (n_rod_point, 2), by at most the motion of
     one end against the other over their length, of which half is left at least. If there are points between stations,
@@ -205,7 +205,7 @@ def _grain(surface: Surface | Obstacle | None) -> np.ndarray:
 
 
 def owned_shapes(scene: SceneConfig, bodies: PlacedBodies) -> list[Owned]:
-    """Shapes of obstacles, then of bodies."""
+    """Return the shapes of obstacles, then of bodies."""
     of_bodies, of_obstacles = colliders(scene)
     world = len(scene.bodies)
     found = []
@@ -220,7 +220,7 @@ def owned_shapes(scene: SceneConfig, bodies: PlacedBodies) -> list[Owned]:
 
 
 def _points_of(part: Owned, owners: list[Collider]) -> list[_Point]:
-    """Centre, corners or rims of a shape, if they meet a surface."""
+    """Return the centre, corners or rims of a shape, if they meet a surface."""
     can_collide = [shapes_can_collide(part.collider, surface) for surface in owners]
     if not any(can_collide):
         return []
@@ -265,13 +265,13 @@ def _nodes_can_collide(
 
 
 def _of_edges(found: Collected, of_nodes: np.ndarray) -> np.ndarray:
-    """Edges of which both nodes meet a surface, shape (n_surface, n_edge)."""
+    """Return the edges of which both nodes meet a surface, shape (n_surface, n_edge)."""
     first = found.column("edge_node", np.int64)
     return np.ascontiguousarray((of_nodes[first] & of_nodes[first + 1]).T)
 
 
 def _from_clamp(node: int, strand: StrandArrays, gap: np.ndarray, clear: float) -> list[int]:
-    """Nodes of a strand from its held end to the first whose gap is at least `clear`, that one excluded."""
+    """Return the nodes of a strand from its held end to the first whose gap is at least `clear`, that one excluded."""
     last = strand.first_node + strand.node_count - 1
     order = range(node, last + 1) if node == strand.first_node else range(node, strand.first_node - 1, -1)
     held = [node]
@@ -298,7 +298,7 @@ def contact_point_names(model: Model) -> list[str]:
 
 
 def start_contact_points(model: Model) -> np.ndarray:
-    """Positions of all contact points at the start [m], shape (n_contact_point, 3)."""
+    """Return the positions of all contact points at the start [m], shape (n_contact_point, 3)."""
     bodies, body = model.bodies, model.surfaces.point_body
     base = np.concatenate([bodies.start_position, np.zeros((1, 3))])[body]
     rotation = np.concatenate([bodies.start_rotation, np.eye(3)[None]])[body]

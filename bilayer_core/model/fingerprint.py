@@ -36,7 +36,7 @@ FREE = "schedules of stimuli, loads, gravity, contact, friction, damping, drag, 
 
 
 def fingerprint_of(scene: SceneConfig, model: str, history: str) -> Array:
-    """Fingerprint of the states of a scene, shape (n_part,).
+    """Return the fingerprint of the states of a scene, shape (n_part,).
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def conditions_of(scene: SceneConfig) -> int:
 
 
 def _content(scene: SceneConfig) -> dict[str, Any]:
-    """All of a scene, as JSON has it: made once, and never changed."""
+    """Return all of a scene, as JSON has it: made once, and never changed."""
     return scene.keep("content", (), lambda: scene.model_dump(mode="json"))
 
 

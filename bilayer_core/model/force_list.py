@@ -246,7 +246,7 @@ def _planned(question: Question) -> dict[str, str]:
 
 
 def active_forces(scene: SceneConfig, model: str, dimension: int) -> tuple[str, ...]:
-    """Names of the forces with an energy that a scene needs."""
+    """Return the names of the forces with an energy that a scene needs."""
     terms = planned(scene, model, dimension)
     return tuple(force.name for force in FORCES if force.kind is not None and terms[force.name] == "active")
 

@@ -72,7 +72,7 @@ def _laws(part: Joint | Guided) -> list[Turning | Sliding]:
 
 
 def start_rates(scene: SceneConfig, velocity: np.ndarray, angular_velocity: np.ndarray) -> np.ndarray:
-    """Rates at the start of all mechanisms [rad/s, m/s], shape (n_mechanism,).
+    """Return the rates at the start of all mechanisms [rad/s, m/s], shape (n_mechanism,).
 
     Parameters
     ----------

@@ -60,8 +60,8 @@ def build_fluid(
 
 
 def _places_of_drag(found: Collected, raised: Raised, number: Array) -> dict[str, Array]:
-    """Arrays of `Flow`: where the middle of a section is off the curve, the two halves of edges at a node each carry
-    their part of its drag, with the node's directions.
+    """Return the arrays of `Flow`: where the middle of a section is off the curve, the two halves of edges at a node
+    each carry their part of its drag, with the node's directions.
     """
     node, edges = found.column("drag_node", np.int64), found.column("drag_edge", np.int64, 2)
     coefficient = found.column("drag_coefficient", width=3)
@@ -85,8 +85,8 @@ def _places_of_drag(found: Collected, raised: Raised, number: Array) -> dict[str
 
 
 def _shares(spans: list[Span], layers: Array) -> tuple[Array, Array]:
-    """Thickness of the section [m], shape (n_place,), and the part of each strand, that of its layer in it, shape
-    (n_strand, n_place).
+    """Return the thickness of the section [m], shape (n_place,), and the part of each strand, that of its layer in it,
+    shape (n_strand, n_place).
     """
     thickness = layers.sum(axis=0)
     return thickness, layers / thickness if len(spans) == len(layers) else np.ones((1, len(thickness)))

@@ -25,14 +25,16 @@ HELD = 0.1
 
 
 def stiffness_that_holds(energy_per_length: float, distance: float) -> float:
-    """K_c [Pa] of a barrier of a distance d̂ [m] that takes up so much [J/m] down to d̂/10, to a digit, rounded up."""
+    """Return K_c [Pa] of a barrier of a distance d̂ [m] that takes up so much [J/m] down to d̂/10, to a digit, rounded
+    up.
+    """
     needed = max(energy_per_length / barrier.py_func(HELD * distance, distance), sys.float_info.min)
     digit = 10.0 ** math.floor(math.log10(needed))
     return math.ceil(needed / digit) * digit
 
 
 def heaviest(model: Model) -> float:
-    """Largest mass per length of contact, of free bodies and of nodes [kg/m]."""
+    """Return the largest mass per length of contact, of free bodies and of nodes [kg/m]."""
     own = model.node_length > 0.0
     found = [float((model.rods.node_mass[own] / model.node_length[own]).max())]
     for slot, body in enumerate(model.free_bodies.body_of_free):
@@ -67,7 +69,7 @@ def impact_warnings(model: Model) -> Iterator[Finding]:
 
 
 def stiffness_for_impacts(model: Model) -> float:
-    """K_c [Pa] of the scene, or what its `contact.impact_speed` needs if that is more; 0 without contact."""
+    """Return K_c [Pa] of the scene, or what its `contact.impact_speed` needs if that is more; 0 without contact."""
     contact = model.scene.contact
     if contact is None:
         return 0.0
@@ -78,7 +80,7 @@ def stiffness_for_impacts(model: Model) -> float:
 
 
 def reason_of_stiffness(model: Model) -> dict[str, str]:
-    """Why `contact_stiffness` is what it is, where that is not the scene's own."""
+    """Return why `contact_stiffness` is what it is, where that is not the scene's own."""
     contact = model.scene.contact
     if contact is None or model.contact_stiffness == contact.stiffness:
         return {}
@@ -110,7 +112,7 @@ def _approaching(model: Model) -> Iterator[tuple[str, float, float, float]]:
 
 
 def _speed(model: Model, positions: Array, radius: Array, velocity: Array) -> float:
-    """Largest speed along a plane's normal with which points meet it [m/s]."""
+    """Return the largest speed along a plane's normal with which points meet it [m/s]."""
     surfaces, gravity, largest = model.surfaces, np.array(model.scene.gravity), 0.0
     for s in np.flatnonzero((surfaces.kind == PLANE) & (surfaces.body == len(model.bodies.names))):
         normal = surfaces.rotation[s][:, 2]

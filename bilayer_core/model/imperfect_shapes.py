@@ -40,8 +40,8 @@ ADVISED = 0.01
 
 
 def departure(rod: Rod, arc: Array) -> tuple[Array, Array]:
-    """Distance from the path [m] and its slope at lengths `arc` [m] along it, towards the normal and across, shapes
-    (n, 2).
+    """Return the distance from the path [m] and its slope at lengths `arc` [m] along it, towards the normal and across,
+    shapes (n, 2).
     """
     weights = _weights(rod.imperfection)
     largest = np.linalg.norm(_modes(rod, np.linspace(0.0, 1.0, SAMPLES))[0] @ weights, axis=1).max()
@@ -60,7 +60,7 @@ def _weights(imperfection: Imperfection) -> Array:
 
 
 def _modes(rod: Rod, x: Array) -> tuple[Array, Array]:
-    """f and df/dx, shapes (n, MODES)."""
+    """Return f and df/dx, shapes (n, MODES)."""
     n, pi, x = np.arange(1, MODES + 1), np.pi, x[:, None]
     if rod.closed:
         rate, phase = 2.0 * pi * (1 + (n + 1) // 2), 0.5 * pi * (1 - n % 2)

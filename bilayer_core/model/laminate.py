@@ -179,7 +179,7 @@ def _layers_in_place(scene: SceneConfig, rod: Rod) -> list[_Placed]:
 
 
 def _axis(layers: list[_Placed]) -> float:
-    """Height over the path [m] of the neutral axis where most edges have the same layers, mean over these.
+    """Return the height over the path [m] of the neutral axis where most edges have the same layers, mean over these.
 
     B = 0 there: Σ (EA/λ) (y − y₀) = 0 with λ in proportion to the layers' lengths, whatever y₀ is.
     """
@@ -200,26 +200,28 @@ def _prevailing(present: Array) -> Array:
 
 
 def _thickness(rod: Rod) -> Array:
-    """Thicknesses of the layers at the middle of edges [m], shape (n_layer, n_edge)."""
+    """Return the thicknesses of the layers at the middle of edges [m], shape (n_layer, n_edge)."""
     return outline(rod, np.arange(stations_of(rod)[1]) + 0.5)[1]
 
 
 def _mass_centre(rod: Rod, layers: list[_Placed], axis: float) -> Array:
-    """Height of the mass centre over the curve at each edge [m]; 0 where it is rounding, shape (n_edge,)."""
+    """Return the height of the mass centre over the curve at each edge [m]; 0 where it is rounding, shape (n_edge,)."""
     mass = sum(layer.mass for layer in layers)
     centre = sum(layer.mass * (layer.height - axis) for layer in layers) / mass
     return np.where(np.abs(centre) > ON_CURVE * _thickness(rod).sum(axis=0), centre, 0.0)
 
 
 def _middle(rod: Rod, axis: float) -> Array:
-    """Height of the middle of the section over the curve at each edge [m]; 0 where it is rounding, shape (n_edge,)."""
+    """Return the height of the middle of the section over the curve at each edge [m]; 0 where it is rounding, shape
+    (n_edge,).
+    """
     layers = _thickness(rod)
     middle = (0.0 if len(layers) == 1 else 0.5 * (layers[1] - layers[0])) - axis
     return np.where(np.abs(middle) > ON_CURVE * layers.sum(axis=0), middle, 0.0)
 
 
 def _faces(rod: Rod, axis: float) -> tuple[Array, Array]:
-    """Heights of the two faces over the curve at each node [m].
+    """Return the heights of the two faces over the curve at each node [m].
 
     Beyond the end of a layer its thickness falls to 0 within the length of an edge, so that they depend on where the
     layer ends, and not only on the nearest station.

@@ -60,7 +60,7 @@ ON_AXIS = 1e-12
 
 
 def side(rod: Rod, slot: int) -> float:
-    """Height of a layer's middle over the path, in its thicknesses."""
+    """Return the height of a layer's middle over the path, in its thicknesses."""
     return 0.0 if len(rod.layers) == 1 else (-0.5, 0.5)[slot]
 
 
@@ -184,7 +184,7 @@ def layer_cells(
 
 
 def _bond_twist(scene: SceneConfig, rod: Rod, layers: list[LayerCells], cells: Cells) -> Array | float:
-    """k_φ c²/λ where both layers are [N m²], λ the mean of theirs, shape (n_copy, n_cell)."""
+    """Return k_φ c²/λ where both layers are [N m²], λ the mean of theirs, shape (n_copy, n_cell)."""
     if len(layers) == 1:
         return 0.0
 
@@ -257,11 +257,11 @@ class WholeSection:
         return np.mean(force + coupling * moment / bending, axis=-1)
 
     def to_nodes(self, per_length: Array) -> Array:
-        """Integrals at nodes of what halves have per length, shape (n_copy, n_node)."""
+        """Return the integrals at nodes of what halves have per length, shape (n_copy, n_node)."""
         return _at_nodes(self._half_length * per_length)
 
     def strain_coupling(self) -> Array:
-        """b of the edges before and after each node [rad], shape (n_copy, n_node, 2)."""
+        """Return b of the edges before and after each node [rad], shape (n_copy, n_node, 2)."""
         _, coupling, bending = self._of_halves
         slope = self._half_length * coupling / bending
         pairs = np.zeros((len(slope), slope.shape[1] + 1, 2))

@@ -120,7 +120,7 @@ def light_of(model: Model) -> Light:
 
 @piece(int, Light, int)
 def shine(light, end):
-    """`look_at_light`, for steps and for states at rest."""
+    """Return `look_at_light`, for steps and for states at rest."""
     look_at_light(light, end)
     return 0
 

@@ -20,7 +20,7 @@ PARTS = 4
 
 
 def no_overrides(count: int) -> Array:
-    """Rows of so many channels and loads of which none is set, shape (count, 4)."""
+    """Return the rows of so many channels and loads of which none is set, shape (count, 4)."""
     return np.full((count, PARTS), math.nan)
 
 

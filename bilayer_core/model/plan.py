@@ -167,7 +167,7 @@ def _recommended(scene: SceneConfig) -> tuple[str, str]:
 
 
 def best_dimension(scene: SceneConfig) -> tuple[int, str]:
-    """2 where the scene stays in a plane, otherwise 3, and why."""
+    """Return 2 where the scene stays in a plane, otherwise 3, and why."""
     plane, reason = find_plane(scene)
     return (3 if plane is None else 2), reason
 

@@ -56,7 +56,7 @@ def require_plane(scene: SceneConfig) -> Plane:
 
 
 def _frames(copy: RodCopy, arc: Array) -> tuple[Array, Array, Array]:
-    """Points [m], tangents and normals of the path of a rod at lengths along it [m]."""
+    """Return the points [m], tangents and normals of the path of a rod at lengths along it [m]."""
     points, tangents, normals = copy.rod.frames_at(arc)
     place = copy.place
     return place.points(points), place.directions(tangents), place.directions(normals)
@@ -104,7 +104,7 @@ class _Survey:
         return all(np.linalg.norm(np.cross(v, self._normal)) <= ROUNDING * np.linalg.norm(v) for v in vectors)
 
     def _place(self, body: Body, point) -> Array:
-        """Where a point of a body's frame is at the start [m]."""
+        """Return where a point of a body's frame is at the start [m]."""
         return np.array(body.position) + rotation_matrix(np.array(body.rotation)) @ np.array(point)
 
     def offences(self) -> Iterator[str]:
@@ -238,7 +238,9 @@ class _Survey:
         return not isinstance(body.motion, Prescribed) and body.motion.turns or self._free_surface
 
     def _points(self, body: Body) -> Array:
-        """Places of its contact points and those of its surface, with radius and length [m], shape (·, 5)."""
+        """Return the places of its contact points and those of its surface, with radius and length [m], shape
+        (·, 5).
+        """
         points = [(*self._place(body, p.position), p.offset, p.length) for p in body.contact_points]
         if body.surface is not None:
             of_surface, radius, length = shape_of(body.surface).points()

@@ -64,7 +64,7 @@ def swollen_energy(curvature: Array, ratio: float | Array, poisson: float) -> Ar
 
 @lru_cache(maxsize=32)
 def _rests(poisson: float) -> Array:
-    """κ/κ̄ at rest for each of `RATIOS`."""
+    """Return κ/κ̄ at rest for each of `RATIOS`."""
     low, high = np.full(RATIOS.size, 0.5), np.full(RATIOS.size, 1.05 + max(poisson, 0.0))
     for _ in range(SECTIONS):  # of the least energy by golden sections
         first, second = high - GOLDEN * (high - low), low + GOLDEN * (high - low)

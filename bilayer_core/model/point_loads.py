@@ -129,7 +129,7 @@ def _copies(scene: SceneConfig, found: Collected, name: str) -> Iterator[tuple[R
 
 
 def _shares(rod: Rod, spans: list[Span], position: float) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes next to a place on the path, and the part of a force or of a mass that each takes.
+    """Return the nodes next to a place on the path, and the part of a force or of a mass that each takes.
 
     Between stations the parts are linear in the position; where two layers cover a station, the path is their
     interface, and each strand takes a part in proportion to the other's thickness. Force, moment and mass centre are

@@ -36,7 +36,7 @@ class PointsBetween:
 
 
 def strip_area(section: Array) -> float:
-    """Area of all rods together [m²]; `section` as in `Surfaces`."""
+    """Return the area of all rods together [m²]; `section` as in `Surfaces`."""
     return float((2.0 * (section[:, 0] + section[:, 1]) * section[:, 3]).sum())
 
 
@@ -54,8 +54,8 @@ def demand_of(shape: Shape, area: float) -> tuple[float, float]:
 
 
 def spacing(demand: tuple[float, float], radius: float, distance: float) -> float:
-    """Distance of points that a demand makes of a rod with half the thickness `radius` [m]; `distance` is that of the
-    barrier.
+    """Return the distance of points that a demand makes of a rod with half the thickness `radius` [m]; `distance` is
+    that of the barrier.
     """
     return max(math.sqrt(4.0 * (demand[0] + radius) * SAG * distance), demand[1])
 

@@ -12,7 +12,7 @@ Array = np.ndarray
 
 
 def halves_at(found: Collected, nodes: Array) -> tuple[Array, Array, Array]:
-    """Edges before and after nodes, which half of each is at the node, and its part of what is at the node.
+    """Return the edges before and after nodes, which half of each is at the node, and its part of what is at the node.
 
     Shapes (n_node, 2); at an end, the second of them has no part.
     """
@@ -23,8 +23,8 @@ def halves_at(found: Collected, nodes: Array) -> tuple[Array, Array, Array]:
 
 
 def directions_at(found: Collected, nodes: Array) -> tuple[Array, Array]:
-    """Two edges at nodes, and the parts of which directions there are mixed, shapes (n_node, 2): the mean of the edges
-    before and after; at an end half an edge on from the last, as it is from the one beside that to it.
+    """Return two edges at nodes, and the parts of which directions there are mixed, shapes (n_node, 2): the mean of the
+    edges before and after; at an end half an edge on from the last, as it is from the one beside that to it.
     """
     edges, _, parts = halves_at(found, nodes)
     edge_node = found.column("edge_node", np.int64)

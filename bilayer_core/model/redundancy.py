@@ -73,7 +73,7 @@ class _Constraints:
         return rows
 
     def rank_alone(self, number: int, joint: Joint) -> int:
-        """How many motions a joint prevents, of two bodies that are free."""
+        """Return how many motions a joint prevents, of two bodies that are free."""
         parts = [slice(6 * index, 6 * index + 6) for index in (self._places[name] for name in joint.bodies)]
         return _rank(np.hstack([self.rows[number][:, part] @ self._motions for part in parts]))
 
@@ -88,7 +88,7 @@ class _Constraints:
 
 
 def _across(axis: tuple[float, float, float]) -> Array:
-    """Two directions across an axis, shape (2, 3)."""
+    """Return two directions across an axis, shape (2, 3)."""
     first = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     first /= np.linalg.norm(first)
     return np.stack([first, np.cross(axis, first)])

@@ -57,7 +57,7 @@ class RodPair:
 
 
 def rod_pairs(scene: SceneConfig) -> tuple[RodPair, ...]:
-    """All pairs of rods, with the decision and its reason."""
+    """Return all pairs of rods, with the decision and its reason."""
     return scene.keep("rod pairs", (), lambda: _rod_pairs(scene))
 
 
@@ -143,7 +143,7 @@ def _can_reach(
 
 
 def _regions(scene: SceneConfig, rod: Rod) -> list[Region | None]:
-    """Balls that the copies of a rod do not leave; None for one that no prescribed body holds."""
+    """Return the balls that the copies of a rod do not leave; None for one that no prescribed body holds."""
     figures = edge_figures(scene, rod)
     extent = rod.path.length * (1.0 + figures.eigenstrain.max()) + figures.thickness.max()
     bodies = {body.name: body for body in scene.bodies if isinstance(body.motion, Prescribed)}

@@ -90,7 +90,7 @@ def rod_points(found: Collected, in_plane: bool) -> RodPoints:
 
 
 def _at_start(found: Collected, node: Array, arm: Array) -> Array:
-    """Positions of points with arms [m], shape (n_rod_point, 3)."""
+    """Return the positions of points with arms [m], shape (n_rod_point, 3)."""
     edges = found.column("node_edges", np.int64, 2)[node]
     m1, tangent = found.column("director1", width=3), found.column("tangent", width=3)
     directions = np.stack([m1, cross(tangent, m1)], axis=1)[edges].mean(axis=1)

@@ -13,7 +13,7 @@ Array = np.ndarray
 
 
 def rail_heights(found: Collected) -> Array:
-    """Heights of the middle between the faces over the nodes [m], shape (n_node,).
+    """Return the heights of the middle between the faces over the nodes [m], shape (n_node,).
 
     Closed strands have none: there rods meet round their curve, up to the farther face.
     """
@@ -37,7 +37,7 @@ def build_rails(found: Collected) -> Rails:
 
 
 def start_rails(found: Collected, rails: Rails) -> Array:
-    """Positions of rails at the start [m], shape (n_node, 3)."""
+    """Return the positions of rails at the start [m], shape (n_node, 3)."""
     position = found.column("position", width=3)
     if not rails.exists:
         return position

@@ -157,8 +157,8 @@ def _joined(scene: SceneConfig, rods: list[Rod]) -> Array:
 
 
 def _strand_points(spacing: float, start: int, length: Array, per_edge: int, closed: bool) -> dict[str, Array]:
-    """Points of strands whose edges have the lengths `length` [m], shape (n_strand, n_edge), and lie `spacing` apart on
-    the path, from station `start` on.
+    """Return the points of strands whose edges have the lengths `length` [m], shape (n_strand, n_edge), and lie
+    `spacing` apart on the path, from station `start` on.
     """
     count, edges = length.shape
     arc = spacing * (start + np.arange(edges))

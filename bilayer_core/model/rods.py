@@ -118,7 +118,9 @@ class _Bonded:
 
 
 def _sections(scene: SceneConfig, rod: Rod, layer: Layer, first: int, last: int) -> tuple[Section, Section]:
-    """Sections of a layer at the stations from first to last, and in the middle of the edges between them."""
+    """Return the sections of a layer at the stations from first to last, and in the middle of the edges between
+    them.
+    """
     material = scene.materials[layer.material]
     stations = np.arange(first, last + 1)
     return sections(rod, layer, material, stations), sections(rod, layer, material, stations[:-1] + 0.5)
@@ -142,7 +144,9 @@ def _elements(
 
 
 def _rest(rod: Rod, layer: Layer, shape: StrandShape) -> Array:
-    """κ̄₁ κ̄₂ ψ̄ of a layer at its nodes [rad]: its natural shape, by default that at the start, shape (n_node, 3)."""
+    """Return κ̄₁ κ̄₂ ψ̄ of a layer at its nodes [rad]: its natural shape, by default that at the start, shape (n_node,
+    3).
+    """
     first, last = stations_of(rod, layer)
     along, rest, voronoi = rod.on_path(np.arange(first, last + 1)), shape.strains(), shape.voronoi
     begin, end = along - 0.5, along + 0.5

@@ -57,7 +57,7 @@ class Section(ReadOnlyArrays):
 
 
 def sections(rod: Rod, layer: Layer, material: Material, stations: Array) -> Section:
-    """Sections of a layer at stations of its rod, which may be whole numbers or lie between."""
+    """Return the sections of a layer at stations of its rod, which may be whole numbers or lie between."""
 
     def made() -> Section:
         along = rod.edge_length * rod.on_path(stations)
@@ -84,7 +84,7 @@ def outline(rod: Rod, stations: Array) -> tuple[Array, Array]:
 
 
 def rectangle(material: Material, width: Array, thickness: Array, stiffness: Array | float = 1.0) -> Section:
-    """Sections `width` × `thickness` [m] of `material`, whose moduli are multiplied with `stiffness`."""
+    """Return the sections `width` × `thickness` [m] of `material`, whose moduli are multiplied with `stiffness`."""
     e = stiffness * material.youngs_modulus
     g = e / (2.0 * (1.0 + material.poisson_ratio))
     area = width * thickness

@@ -66,7 +66,9 @@ def friction_values(law: Friction | None, of_bodies: Array, *grains: Array) -> d
 
 
 def contact_point_friction(law: Friction | None, of_bodies: Array) -> Array:
-    """Coefficients forward, backward and sideways of contact points, of which some are of bodies, shape (n, 3)."""
+    """Return the coefficients forward, backward and sideways of contact points, of which some are of bodies, shape (n,
+    3).
+    """
     coefficients = np.full((len(of_bodies), len(COEFFICIENTS) - 1), law.of_rods if law is not None else 0.0)
     coefficients[of_bodies] = law.coefficient if law is not None else 0.0
     return coefficients

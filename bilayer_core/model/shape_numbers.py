@@ -52,8 +52,8 @@ class Shape:
         return float(corner + self.rounding)
 
     def points(self) -> tuple[np.ndarray, float, float]:
-        """Points that feel other surfaces, in the owner's frame [m], shape (·, 3), their radius and their length Δl
-        [m].
+        """Return the points that feel other surfaces, in the owner's frame [m], shape (·, 3), their radius and their
+        length Δl [m].
 
         A ball is its centre with its radius, also as length. Corners of a box stand for half of each of their three
         edges, points on the rim of a cylinder for their part of it. Where rounding leaves nothing between two, they are
@@ -76,7 +76,7 @@ class Shape:
         return found @ self.rotation.T, self.rounding, length * len(points) / len(found)
 
     def inertia(self, mass: float, shell: bool = False) -> np.ndarray:
-        """Inertia tensor of the solid shape, without regard to its rounding, or of a hollow ball [kg m²]."""
+        """Return the inertia tensor of the solid shape, without regard to its rounding, or of a hollow ball [kg m²]."""
         a, b, c = self.half
         if self.kind == "sphere":
             moments = (2.0 / 3.0 if shell else 0.4) * a**2 * np.ones(3)
@@ -89,7 +89,9 @@ class Shape:
 
 
 def axis_frame(axis: np.ndarray) -> np.ndarray:
-    """Rotation that takes z to `axis` (unit) on the shortest way; about x where they are opposite, shape (3, 3)."""
+    """Return the rotation that takes z to `axis` (unit) on the shortest way; about x where they are opposite, shape (3,
+    3).
+    """
     cross = np.array([-axis[1], axis[0], 0.0])
     sine = np.linalg.norm(cross)
     if sine == 0.0:
@@ -111,14 +113,15 @@ def shape_of(surface: scene_shapes.Surface | scene_shapes.Obstacle) -> Shape:
 
 
 def obstacle_pose(obstacle: scene_shapes.Obstacle) -> tuple[np.ndarray, np.ndarray]:
-    """Position [m], shape (3,), and rotation of an obstacle, shape (3, 3)."""
+    """Return the position [m], shape (3,), and rotation of an obstacle, shape (3, 3)."""
     position = obstacle.point if obstacle.type == "plane" else obstacle.position
     rotation = rotation_matrix(np.array(obstacle.rotation)) if obstacle.type == "box" else np.eye(3)
     return np.array(position), rotation
 
 
 def signed_distance(shape: Shape, points: np.ndarray) -> np.ndarray:
-    """Distance of points of the owner's frame from a shape [m], negative inside (there up to the rounding of edges).
+    """Return the distance of points of the owner's frame from a shape [m], negative inside (there up to the rounding of
+    edges).
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from bilayer_core.model.unknown_order import OF_RAILS
 
 
 def sizes_of(model: Model) -> dict[str, int]:
-    """How many there are of everything that does not change in number."""
+    """Return how many there are of everything that does not change in number."""
     layout, rods, surfaces = model.solved_layout, model.rods, model.surfaces
     bodies, scene = len(model.bodies.names), model.scene
     edges = rods.edge_count + len(model.constrained.clamp_edge_body)

@@ -53,7 +53,7 @@ class RigidMotion:
     about: Array
 
     def at(self, points: Array) -> Array:
-        """Velocities of points [m/s], shape (n, 3)."""
+        """Return the velocities of points [m/s], shape (n, 3)."""
         return self.velocity + np.cross(self.angular_velocity, points - self.about)
 
 

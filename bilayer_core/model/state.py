@@ -99,7 +99,7 @@ class State:
         self.values[:] = other.values
 
     def flat(self) -> Array:
-        """All parts in order, as one array of float64, with a seal: what has one is as a run left it."""
+        """Return all parts in order, as one array of float64, with a seal: what has one is as a run left it."""
         return sealed(self.values, self.place_of_seal)
 
     def layout(self) -> tuple[tuple[str, tuple[int, ...]], ...]:

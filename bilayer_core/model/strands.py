@@ -56,7 +56,7 @@ class Collected:
         return self.laws.index(numbers)
 
     def laws_of_elements(self, scene: SceneConfig, law: Eigenstrain, count: int) -> Array:
-        """Numbers of laws of their own for so many elements of a layer, which light reaches differently."""
+        """Return the numbers of laws of their own for so many elements of a layer, which light reaches differently."""
         first = len(self.laws)
         self.laws += [_numbers_of(scene, law)] * count
         return first + np.arange(count)
@@ -104,7 +104,9 @@ class StrandShape:
         return self._strains[..., 0] / self.voronoi
 
     def strains(self) -> Array:
-        """κ₁ κ₂ ψ [rad] at each node: between the edges at it, at the ends between path and edge, shape (n_node, 3)."""
+        """Return κ₁ κ₂ ψ [rad] at each node: between the edges at it, at the ends between path and edge, shape (n_node,
+        3).
+        """
         return self._strains.copy()
 
     @cached_property
@@ -120,8 +122,8 @@ class StrandShape:
 
 
 def stations_of(rod: Rod, layer: Layer | None = None) -> tuple[int, int]:
-    """First and last station of the strand of a layer, or of the whole rod: one beyond those of the path if it is
-    closed.
+    """Return the first and last station of the strand of a layer, or of the whole rod: one beyond those of the path if
+    it is closed.
     """
     first, last = (0, rod.stations - 1) if layer is None else rod.covered_stations(layer)
     return first, last + int(is_closed(rod, first, last))
@@ -133,13 +135,13 @@ def is_closed(rod: Rod, first: int, last: int) -> bool:
 
 
 def with_copies(rod: Rod, edges: Array) -> Array:
-    """Edges of the path of a rod, and the copy of the first one of a closed rod if that is among them."""
+    """Return the edges of the path of a rod, and the copy of the first one of a closed rod if that is among them."""
     return np.append(edges, rod.stations - 1) if rod.closed and 0 in edges else edges
 
 
 def strand_shape(rod: Rod, height: Array, first: int, last: int, place: Placement) -> StrandShape:
-    """Shape of the strand that lies `height` [m] over the path at the stations from first to last; of several places
-    at once (`scene.pattern.stacked`), that in each of them.
+    """Return the shape of the strand that lies `height` [m] over the path at the stations from first to last; of
+    several places at once (`scene.pattern.stacked`), that in each of them.
     """
     shape = _shape(rod, height, first, last, place, Rod.frames_at)
     if rod.imperfection is None:
@@ -149,8 +151,8 @@ def strand_shape(rod: Rod, height: Array, first: int, last: int, place: Placemen
 
 
 def strand_lengths(rod: Rod, heights: Array, last: int) -> Array:
-    """Lengths [m] of the edges of strands over the path from its start to a station, shape (n_strand, n_edge);
-    `heights` [m] is theirs over the path, shape (n_strand, n_node).
+    """Return the lengths [m] of the edges of strands over the path from its start to a station, shape (n_strand,
+    n_edge); `heights` [m] is theirs over the path, shape (n_strand, n_node).
     """
     arc = rod.edge_length * rod.on_path(np.arange(last + 1))
     points, _, normals = rod.frames_at(arc) if rod.imperfection is None else _imperfect_frames(rod, arc)
@@ -158,8 +160,8 @@ def strand_lengths(rod: Rod, heights: Array, last: int) -> Array:
 
 
 def _edges(positions: Array, closed: bool) -> tuple[Array, Array]:
-    """Vectors and lengths [m] of edges between nodes; of a closed strand the last two nodes become the first, to the
-    last digit.
+    """Return the vectors and lengths [m] of edges between nodes; of a closed strand the last two nodes become the
+    first, to the last digit.
     """
     if closed:
         positions[..., -2:, :] = positions[..., :2, :]
@@ -281,7 +283,7 @@ def add_strands(
     found.strands += strands
 
     def of_all(values: Array) -> Array:
-        """Numbers of nodes or edges, those of each strand or the same of all, one strand after the other."""
+        """Return the numbers of nodes or edges, those of each strand or the same of all, one strand after the other."""
         return values.ravel() if values.ndim == 2 else np.concatenate([values] * count)
 
     around = np.stack([np.maximum(index - 1, 0), np.minimum(index, edges - 1)], axis=1)

@@ -53,7 +53,7 @@ NODES, WEIGHTS = 0.5 * (1.0 + _NODES), 0.5 * _WEIGHTS
 
 
 def rectangle_torsion(shear_modulus: Array, width: Array, thickness: Array) -> Array:
-    """GJ of rectangles [N m²]; `shear_modulus` [Pa], `width`, `thickness` [m] of any one shape."""
+    """Return GJ of rectangles [N m²]; `shear_modulus` [Pa], `width`, `thickness` [m] of any one shape."""
     short, long = np.minimum(width, thickness), np.maximum(width, thickness)
     ratio = long / short
     decay = np.exp(-np.pi * np.multiply.outer(ratio, ODD))
@@ -62,7 +62,7 @@ def rectangle_torsion(shear_modulus: Array, width: Array, thickness: Array) -> A
 
 
 def bond_torsion(shear_moduli: Array, width: Array, thickness: Array) -> Array:
-    """GJ_lam − ΣGJ of two layers that are bonded [N m²], above 0.
+    """Return GJ_lam − ΣGJ of two layers that are bonded [N m²], above 0.
 
     Parameters
     ----------

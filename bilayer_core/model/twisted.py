@@ -167,7 +167,7 @@ class TwistedRod:
         self._whole_twist = self._twist.sum(axis=0) + self._tilt * self._tilt_arm**2
 
     def _over_axis(self, axial: Array) -> Array:
-        """Heights of layers over the neutral axis [m]."""
+        """Return the heights of layers over the neutral axis [m]."""
         return self._middle - (axial * self._middle).sum(axis=0) / axial.sum(axis=0)
 
     def held_back(self, two_rods: bool) -> float:
@@ -184,7 +184,7 @@ class TwistedRod:
         return float(whole / self._length * np.tanh(self._length / max(whole, 1e-300)))
 
     def stretch(self) -> float:
-        """Largest part by which the stretch of borders changes the torque."""
+        """Return the largest part by which the stretch of borders changes the torque."""
         natural = self._path_twist + self._natural_twist
         squares = (self._axial * (self._linear(0.0)[2] ** 2 - natural**2)).sum(axis=0)
         return float(np.abs(squares * self._width**4 / (360.0 * self._whole_twist)).max())
@@ -195,14 +195,14 @@ class TwistedRod:
         return np.array([self._axial.sum(axis=0), bending.sum(axis=0), self._whole_twist])
 
     def _linear(self, eigenstrain: Array | float) -> Array:
-        """ε, χ, τ of `laminate`, shape (3, n_edge)."""
+        """Return ε, χ, τ of `laminate`, shape (3, n_edge)."""
         force = self._axial * eigenstrain
         moment = self._bend * (self._natural_curvature - self._path) - force * self._height_over_axis
         loads = np.array([force.sum(axis=0), moment.sum(axis=0), (self._twist * self._natural_twist).sum(axis=0)])
         return loads / self._stiffness() + np.array([0.0 * self._path, self._path, self._path_twist])
 
     def _of_layers(self, at: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """r, ψ, χ_l, τ_l of layers and cos ψ for ε, χ, τ of the curve, shapes (n_layer, n_edge)."""
+        """Return r, ψ, χ_l, τ_l of layers and cos ψ for ε, χ, τ of the curve, shapes (n_layer, n_edge)."""
         (strain, chi, tau), z = at, self._height_over_axis
         a, b = 1.0 + strain - z * chi, z * tau
         r = np.hypot(a, b)
@@ -210,7 +210,7 @@ class TwistedRod:
         return r, np.arctan2(b, a), chi * cosine - tau * sine, tau * cosine + chi * sine, cosine
 
     def _gradient(self, at: Array, eigenstrain: Array | float) -> Array:
-        """∂E/∂(ε, χ, τ), shape (3, n_edge)."""
+        """Return ∂E/∂(ε, χ, τ), shape (3, n_edge)."""
         z = self._height_over_axis
         r, tilt, own_chi, own_tau, cosine = self._of_layers(at)
         sine = z * at[2] / r
@@ -233,7 +233,9 @@ class TwistedRod:
         )
 
     def helix_errors(self) -> tuple[float, float]:
-        """Largest relative errors of radius and pitch of `laminate`, without stimuli and at all their extremes."""
+        """Return the largest relative errors of radius and pitch of `laminate`, without stimuli and at all their
+        extremes.
+        """
         if len(self._axial) == 1:
             return 0.0, 0.0
         errors = np.zeros(2)
@@ -249,6 +251,6 @@ class TwistedRod:
 
 
 def _helix(at: Array) -> Array:
-    """Radius and pitch/2π [m] of a curve of ε, χ, τ, shape (2, n_edge)."""
+    """Return the radius and pitch/2π [m] of a curve of ε, χ, τ, shape (2, n_edge)."""
     strain, chi, tau = at
     return (1.0 + strain) * np.abs([chi, tau]) / np.maximum(chi**2 + tau**2, np.finfo(float).tiny)

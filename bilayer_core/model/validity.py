@@ -191,7 +191,7 @@ def _of_barrier(name: str, thin: float, distance: float) -> Figure:
 
 
 def longest_edge(scene: SceneConfig, rod: Rod) -> float:
-    """Length of edges between whose nodes nothing comes that is not small beside the rod [m]."""
+    """Return the length of edges between whose nodes nothing comes that is not small beside the rod [m]."""
     return COARSE * float(edge_figures(scene, rod).thickness.min() + scene.contact.barrier_distance)
 
 
@@ -222,7 +222,7 @@ def _of_points(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterator[
 
 
 def _eigenstrain_range(scene: SceneConfig, rod: Rod, layer: Layer, laws: tuple[Eigenstrain, ...]) -> np.ndarray:
-    """Largest magnitude, least and largest eigenstrain over the channels' ranges, shape (3, n_edge)."""
+    """Return the largest magnitude, least and largest eigenstrain over the channels' ranges, shape (3, n_edge)."""
     found = np.zeros((3, rod.stations - 1))
     for law in laws:
         channel = scene.stimuli[law.stimulus]
@@ -233,7 +233,7 @@ def _eigenstrain_range(scene: SceneConfig, rod: Rod, layer: Layer, laws: tuple[E
 
 
 def edge_figures(scene: SceneConfig, rod: Rod) -> EdgeFigures:
-    """Figures of a rod of a scene."""
+    """Return the figures of a rod of a scene."""
     return scene.keep("edge figures", (rod,), lambda: EdgeFigures(scene, rod))
 
 
@@ -280,13 +280,13 @@ class EdgeFigures:
         )
 
     def curvature(self) -> np.ndarray:
-        """Largest curvature without loads [1/m], shape (n_edge,): that of the path, or that to which the layers'
-        natural curvatures bend it, together with what eigenstrains add at most.
+        """Return the largest curvature without loads [1/m], shape (n_edge,): that of the path, or that to which the
+        layers' natural curvatures bend it, together with what eigenstrains add at most.
         """
         return np.maximum(np.abs(self._path), np.abs(self._path + self.natural_change())) + self.free_curvature()
 
     def bend_of_layers(self) -> np.ndarray:
-        """Natural curvature times thickness of each layer by itself, shape (n_layer, n_edge)."""
+        """Return the natural curvature times thickness of each layer by itself, shape (n_layer, n_edge)."""
         return np.abs(self._natural) * self._layers
 
     def natural_change(self) -> np.ndarray:

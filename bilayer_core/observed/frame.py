@@ -8,8 +8,8 @@ import numpy as np
 
 
 def strain_at(offset: np.ndarray, strain: np.ndarray, curvature: np.ndarray, at_start: np.ndarray) -> np.ndarray:
-    """Axial strain at a distance y = `offset` from a curve, in a section that stays plane: (1 + ε − yχ)/(1 − yχ₀) − 1
-    with the curve's strain ε, its curvature χ, and that at the start χ₀.
+    """Return the axial strain at a distance y = `offset` from a curve, in a section that stays plane: (1 + ε − yχ)/(1 −
+    yχ₀) − 1 with the curve's strain ε, its curvature χ, and that at the start χ₀.
     """
     return (1.0 + strain - offset * curvature) / (1.0 - offset * at_start) - 1.0
 
@@ -56,7 +56,7 @@ class Strand:
         return f"Strand({self.name}: nodes {self.nodes.start} to {self.nodes.stop - 1}{parts})"
 
     def strain_of(self, strain: np.ndarray, curvature: np.ndarray) -> np.ndarray:
-        """Axial strain in the middle of its section; see `strain_at`.
+        """Return the axial strain in the middle of its section; see `strain_at`.
 
         Parameters
         ----------

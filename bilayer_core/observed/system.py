@@ -10,7 +10,7 @@ import numpy as np
 
 
 def versions() -> dict[str, str]:
-    """Versions of this package and of what its results depend on."""
+    """Return the versions of this package and of what its results depend on."""
     return dict(_versions())
 
 

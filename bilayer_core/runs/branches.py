@@ -129,7 +129,7 @@ def run_branches(
 def _with(
     stimuli: dict[str, float | None], loads: dict[str, float | None], name: str, value: float
 ) -> tuple[dict[str, float | None], dict[str, float | None]]:
-    """Stimuli and loads with that of a name."""
+    """Return the stimuli and loads with that of a name."""
     kind, _, own = name.partition(".")
     return (stimuli | {own: value}, loads) if f"{kind}." == STIMULUS else (stimuli, loads | {own: value})
 

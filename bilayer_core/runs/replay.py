@@ -289,7 +289,7 @@ def set_from_outside(
 
 
 def _friction_in(overrides: Sequence[str]) -> list[str]:
-    """Coefficients that changes to a scene are about, which then act instead of those set in a log's run."""
+    """Return the coefficients that changes to a scene are about, which then act instead of those set in a log's run."""
     asked = {of.partition("=")[0] for of in overrides}
     whole = bool(asked & {"contact", "contact.friction"})
     return [key for key in COEFFICIENTS if whole or f"contact.friction.{key}" in asked]

@@ -64,7 +64,7 @@ def bundled_directory(kind: str) -> Path:
 
 
 def _files(directory: Path) -> list[str]:
-    """Names of the scene files in a directory, in alphabetical order; none if there is no such directory."""
+    """Return the names of the scene files in a directory, in alphabetical order; none if there is no such directory."""
     try:
         return sorted(name for name in os.listdir(directory) if name.endswith(SUFFIX))
     except OSError:
@@ -77,22 +77,22 @@ def _bundled(kind: str) -> dict[str, Path]:
 
 
 def bundled_scenes() -> dict[str, Path]:
-    """File of each bundled scene by its name, in alphabetical order."""
+    """Return the file of each bundled scene by its name, in alphabetical order."""
     return _bundled("scenes")
 
 
 def bundled_templates() -> dict[str, Path]:
-    """File of each template of a new scene by its name, in alphabetical order."""
+    """Return the file of each template of a new scene by its name, in alphabetical order."""
     return _bundled("templates")
 
 
 def bundled_sweeps() -> dict[str, Path]:
-    """File of each bundled sweep by its name, in alphabetical order."""
+    """Return the file of each bundled sweep by its name, in alphabetical order."""
     return _bundled("sweeps")
 
 
 def bundled_scene(name: str) -> Path:
-    """File of a bundled scene.
+    """Return the file of a bundled scene.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def bundled_scene(name: str) -> Path:
 
 
 def bundled_sweep(name: str) -> Path:
-    """File of a bundled sweep.
+    """Return the file of a bundled sweep.
 
     Raises
     ------

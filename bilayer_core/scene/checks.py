@@ -28,7 +28,7 @@ class SceneConfig(Protocol):
 
 
 def faults_of_scene(scene: SceneConfig) -> list[Fault]:
-    """Names that refer to other parts, names that occur twice, and parts that need another."""
+    """Return the names that refer to other parts, names that occur twice, and parts that need another."""
     too_large = faults_of_size(scene)
     if too_large:
         return too_large
@@ -108,7 +108,9 @@ def _rest_lengths(scene: SceneConfig) -> Iterator[Fault]:
 
 
 def _rest_length(scene: SceneConfig, rod: Rod, index: int) -> tuple[float, int, float, str] | None:
-    """Least eigenstrain of a layer that leaves it no length, the law to blame for it with its gain, and the demand."""
+    """Return the least eigenstrain of a layer that leaves it no length, the law to blame for it with its gain, and the
+    demand.
+    """
     layer = rod.layers[index]
     spans = [rod.span_of(layer, law) for law in layer.eigenstrain]
     begins = [begin for begin, end in spans if begin < end]
@@ -137,7 +139,7 @@ SAMPLES = 257
 
 
 def _least_strain(scene: SceneConfig, laws: list[Eigenstrain]) -> float:
-    """Least sum of the eigenstrains of some laws that the ranges of their channels allow.
+    """Return the least sum of the eigenstrains of some laws that the ranges of their channels allow.
 
     Laws of one channel with the same lags have reached the same stimulus at any time. Others may be anywhere in their
     ranges independently, as lags never leave the range of what they follow.

@@ -101,7 +101,7 @@ class Curve(ABC):
         return float(np.arctan2(first @ np.cross(tangents[0], last), first @ last))
 
     def frames(self, normal: Array, arc: Array) -> tuple[Array, Array, Array]:
-        """Points [m], tangents and normals at lengths `arc` [m] from the start, shapes (n, 3)."""
+        """Return the points [m], tangents and normals at lengths `arc` [m] from the start, shapes (n, 3)."""
         if self.normals is None and not self.closed:
             return self.carried(normal, arc)
         if self.normals is None:
@@ -113,7 +113,7 @@ class Curve(ABC):
         return points, tangents, np.cos(angle) * carried + np.sin(angle) * np.cross(tangents, carried)
 
     def curvatures(self, normal: Array, arc: Array, over: float) -> Array:
-        """Curvature towards the normal and across, and twist [1/m] there, shape (n, 3)."""
+        """Return the curvature towards the normal and across, and twist [1/m] there, shape (n, 3)."""
         _, tangents, normals = self.frames(normal, arc)
         bend, across = self.bend(arc, over), np.cross(tangents, normals)
         even = np.full(len(arc), self.closing / self.knots[-1])
@@ -153,7 +153,7 @@ class Polyline(Curve):
         return np.clip(np.searchsorted(self.knots, arc, side="right") - 1, 0, len(self._tangents) - 1)
 
     def carried(self, normal: Array, arc: Array) -> tuple[Array, Array, Array]:
-        """Frames whose normals do not twist; at a corner the mean of both sides."""
+        """Return the frames whose normals do not twist; at a corner the mean of both sides."""
         own = self._transport @ across(normal[None], self._tangents[:1])[0]
         near = ROUNDING * self.knots[-1]
         before, after = self._segment(arc - near), self._segment(arc + near)
@@ -173,7 +173,9 @@ class Polyline(Curve):
         return (np.diff(self.angles) / np.diff(self.knots))[self._segment(arc)]
 
     def bend(self, arc: Array, over: float) -> Array:
-        """t′ [1/m]: of each corner less than half of `over` away 2 tan(θ/2) over that length, as a joint has it."""
+        """Return t′ [1/m]: of each corner less than half of `over` away 2 tan(θ/2) over that length, as a joint
+        has it.
+        """
         before, after = self._beside_corners
         kinks = (after - before) / np.cos(0.5 * self.corners)[:, None]
         distance = arc[:, None] - self.sharpest
@@ -205,7 +207,7 @@ class Spline(Curve):
         self.turn = float(2.0 * np.arcsin(halves).sum())
 
     def _length_between(self, begin: Array, end: Array) -> Array:
-        """Length of the curve between parameters no farther apart than a cell [m]."""
+        """Return the length of the curve between parameters no farther apart than a cell [m]."""
         places, weights = GAUSS
         middle, width = 0.5 * (begin + end), end - begin
         speed = np.linalg.norm(self._curve(middle[:, None] + width[:, None] * places, 1), axis=2)
@@ -227,7 +229,7 @@ class Spline(Curve):
         return _products(_double_reflections(points[:-1], tangents[:-1], points[1:], tangents[1:]))
 
     def carried(self, normal: Array, arc: Array) -> tuple[Array, Array, Array]:
-        """Frames whose normals do not twist."""
+        """Return the frames whose normals do not twist."""
         at, cell = self._located(arc)
         points, tangents = self._curve(at), unit(self._curve(at, 1))
         own = self._transport @ across(normal[None], self._tangents[:1])[0]
@@ -255,14 +257,14 @@ class Spline(Curve):
         return self._turning(arc, derivative) + self._ramp * (arc if derivative == 0 else 1.0)
 
     def bend(self, arc: Array, over: float) -> Array:
-        """t′ [1/m], but for a part along t."""
+        """Return t′ [1/m], but for a part along t."""
         at, _ = self._located(arc)
         speed = np.linalg.norm(self._curve(at, 1), axis=1, keepdims=True)
         return self._curve(at, 2) / speed**2
 
 
 def unit(vectors: Array) -> Array:
-    """Vectors at length 1, shape (n, 3)."""
+    """Return the vectors at length 1, shape (n, 3)."""
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
@@ -275,20 +277,20 @@ def across(normals: Array, tangents: Array) -> Array:
 
 
 def _reflections(vectors: Array) -> Array:
-    """Matrices that reflect along vectors, shape (n, 3, 3)."""
+    """Return the matrices that reflect along vectors, shape (n, 3, 3)."""
     squares = (vectors * vectors).sum(axis=1)
     scale = 2.0 / np.where(squares > 0.0, squares, 1.0)
     return np.eye(3) - scale[:, None, None] * vectors[:, :, None] * vectors[:, None, :]
 
 
 def _rotations(tangents: Array, next_tangents: Array) -> Array:
-    """Matrices of the least rotations that take unit vectors to others, shape (n, 3, 3)."""
+    """Return the matrices of the least rotations that take unit vectors to others, shape (n, 3, 3)."""
     return _reflections(tangents + next_tangents) @ _reflections(tangents)
 
 
 def _double_reflections(points: Array, tangents: Array, next_points: Array, next_tangents: Array) -> Array:
-    """Matrices that carry normals on without twist from places of a curve to others, shape (n, 3, 3) (Wang, Jüttler,
-    Zheng and Liu 2008, Computation of rotation minimizing frames).
+    """Return the matrices that carry normals on without twist from places of a curve to others, shape (n, 3, 3) (Wang,
+    Jüttler, Zheng and Liu 2008, Computation of rotation minimizing frames).
     """
     way = next_points - points
     far = np.linalg.norm(way, axis=1, keepdims=True) > ROUNDING * np.abs(next_points).max(axis=1, keepdims=True)

@@ -110,7 +110,7 @@ class Eigenstrain(BaseModel):
         return both if rising is None else rising, both if falling is None else falling
 
     def strain_at(self, stimulus: np.ndarray) -> np.ndarray:
-        """Eigenstrain where the material has reached a stimulus (`scene.transduction.eigenstrain_of`)."""
+        """Return the eigenstrain where the material has reached a stimulus (`scene.transduction.eigenstrain_of`)."""
         strain = self.gain * (stimulus - self.reference)
         return strain if self.saturation is None else self.saturation * np.tanh(strain / self.saturation)
 

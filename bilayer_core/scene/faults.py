@@ -63,7 +63,7 @@ def one_of(what: str, found: object, allowed: Iterable[str]) -> str:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Names in a row, cut off where they get long."""
+    """Return the names in a row, cut off where they get long."""
     return shortened(", ".join(names), LONGEST_LIST)
 
 
@@ -74,7 +74,7 @@ def suggestion(found: object, allowed: Iterable[str]) -> str:
 
 
 def tell(error: ValidationError, schema: type[BaseModel], data: Any, source: str) -> str:
-    """All faults of `error` as lines of text.
+    """Return all faults of `error` as lines of text.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def _annotation_at(schema: Any, location: Location) -> Any:
 
 
 def _tags(member: Any) -> tuple[Any, ...]:
-    """Values by which a member of a discriminated union is chosen."""
+    """Return the values by which a member of a discriminated union is chosen."""
     if not _is_model(member):
         return ()
     choices = [field.annotation for field in member.model_fields.values() if get_origin(field.annotation) is Literal]

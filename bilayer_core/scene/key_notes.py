@@ -44,7 +44,7 @@ def models_in(annotation: Any) -> list[type[BaseModel]]:
 
 
 def scene_models() -> list[type[BaseModel]]:
-    """All classes of a scene, each one before those that it refers to for the first time."""
+    """Return all classes of a scene, each one before those that it refers to for the first time."""
     found: dict[type[BaseModel], None] = {}
 
     def visit(model: type[BaseModel]) -> None:
@@ -77,7 +77,7 @@ def json_schema() -> dict[str, Any]:
 
 
 def _definitions(schema: dict[str, Any], model: type[BaseModel]) -> list[dict[str, Any]]:
-    """Where a JSON Schema describes a class; several places for a class with parameters."""
+    """Return where a JSON Schema describes a class; several places for a class with parameters."""
     if model is SceneConfig:
         return [schema]
     name = model.__name__

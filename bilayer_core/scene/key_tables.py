@@ -109,7 +109,7 @@ def _places() -> dict[type[BaseModel], list[str]]:
 
 
 def _item(annotation: Any, model: type[BaseModel]) -> str:
-    """How an item of a list or a mapping is addressed."""
+    """Return how an item of a list or a mapping is addressed."""
     origin = get_origin(annotation)
     if origin is dict or (origin is list and "name" in model.model_fields):
         return ".NAME"

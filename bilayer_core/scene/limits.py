@@ -149,7 +149,7 @@ def _faults_of_light(scene: Rods, sizes: list[tuple[int, int]], nodes: int) -> l
 
 
 def refused_file_name(name: str) -> str:
-    """Why a file that a scene names is not one of its folder; empty if it is."""
+    """Return why a file that a scene names is not one of its folder; empty if it is."""
     if "\0" in name or not name:
         return "must be the name of a file"
     parts = Path(os.path.normpath(name)).parts
@@ -159,5 +159,5 @@ def refused_file_name(name: str) -> str:
 
 
 def longest(items: Iterable[str], most: int = 60) -> str:
-    """Items in a row, cut off where they get long."""
+    """Return the items in a row, cut off where they get long."""
     return shortened(", ".join(items), most)

@@ -65,12 +65,14 @@ def parse_scene(text: str, source: str, overrides: Overrides = (), directory: Pa
 
 
 def scene_text(config: SceneConfig) -> str:
-    """YAML that loads to the same configuration bit for bit: every value is written out, in SI units."""
+    """Return YAML that loads to the same configuration bit for bit: every value is written out, in SI units."""
     return write_yaml(scene_content(config))
 
 
 def scene_content(config: SceneConfig) -> dict[str, Any]:
-    """Content of a scene with every value written out, in SI units and with the tables of its files, as JSON has it."""
+    """Return the content of a scene with every value written out, in SI units and with the tables of its files, as JSON
+    has it.
+    """
     return config.model_dump(mode="json", by_alias=True)
 
 

@@ -73,7 +73,7 @@ def _demand_perpendicular(normal: Array, direction: tuple[float, float, float], 
 
 
 def _along_normal(curvature: Array) -> Array:
-    """Curvatures of a path in the plane of its tangent and its normal, shape (n, 3)."""
+    """Return the curvatures of a path in the plane of its tangent and its normal, shape (n, 3)."""
     return np.stack([curvature, 0.0 * curvature, 0.0 * curvature], axis=1)
 
 
@@ -98,12 +98,12 @@ class StraightPath(Path):
         return 0.0
 
     def frames_at(self, normal: Array, arc: Array) -> Frames:
-        """Frames at lengths `arc` [m] from the start."""
+        """Return the frames at lengths `arc` [m] from the start."""
         ones, tangent = np.ones((len(arc), 1)), np.array(self.direction)
         return np.array(self.start) + np.outer(arc, tangent), ones * tangent, ones * normal
 
     def curvatures_at(self, normal: Array, arc: Array, over: float) -> Array:
-        """χ, ξ, τ [1/m] at lengths `arc` [m], shape (n, 3)."""
+        """Return χ, ξ, τ [1/m] at lengths `arc` [m], shape (n, 3)."""
         return np.zeros((len(arc), 3))
 
 
@@ -140,7 +140,8 @@ class ArcPath(Path):
         return self.angle
 
     def frames_at(self, normal: Array, arc: Array) -> Frames:
-        """Frames at lengths `arc` [m] from the start, with κ < 0 for a centre on the other side of the normal.
+        """Return the frames at lengths `arc` [m] from the start, with κ < 0 for a centre on the other side of the
+        normal.
 
         t(s) = cos κs t₀ + sin κs n₀,  n(s) = cos κs n₀ − sin κs t₀,  x(s) = x₀ + (sin κs t₀ + (1 − cos κs) n₀)/κ
         """
@@ -154,7 +155,7 @@ class ArcPath(Path):
         )
 
     def curvatures_at(self, normal: Array, arc: Array, over: float) -> Array:
-        """χ, ξ, τ [1/m] at lengths `arc` [m], shape (n, 3)."""
+        """Return χ, ξ, τ [1/m] at lengths `arc` [m], shape (n, 3)."""
         return _along_normal(np.full(len(arc), _side(self.toward) / self.radius))
 
     def describe(self) -> str:
@@ -203,7 +204,7 @@ class SpiralPath(Path):
         return (self.end_radius - self.start_radius) / self.angle
 
     def _length_to(self, angle: Any) -> Any:
-        """∫ √(r² + a²) dφ from the start to an angle [rad], with the radius r = r₀ + a φ [m]."""
+        """Return ∫ √(r² + a²) dφ from the start to an angle [rad], with the radius r = r₀ + a φ [m]."""
 
         def primitive(radius):
             slant = np.hypot(radius, self.growth)
@@ -217,7 +218,9 @@ class SpiralPath(Path):
         return float(self._length_to(self.angle))
 
     def angle_at(self, arc: Array) -> Array:
-        """Angles about the centre [rad] at lengths `arc` [m] from the start: Newton's method on the length."""
+        """Return the angles about the centre [rad] at lengths `arc` [m] from the start: Newton's method on the
+        length.
+        """
         angle = self.angle * arc / self.length
         for _ in range(20):
             slope = np.hypot(self.start_radius + self.growth * angle, self.growth)
@@ -231,7 +234,7 @@ class SpiralPath(Path):
         return self.angle + slope
 
     def frames_at(self, normal: Array, arc: Array) -> Frames:
-        """Frames at lengths `arc` [m] from the start.
+        """Return the frames at lengths `arc` [m] from the start.
 
         With e₁ the direction from the centre to the start, e₂ that in which φ grows, ρ = cos φ e₁ + sin φ e₂, ρ′ =
         ∂ρ/∂φ and the centre on the side ±1 of the normal,
@@ -251,7 +254,7 @@ class SpiralPath(Path):
         return points, (growth * outward + own * around) / slant, side * (growth * around - own * outward) / slant
 
     def curvatures_at(self, normal: Array, arc: Array, over: float) -> Array:
-        """χ, ξ, τ [1/m] at lengths `arc` [m], shape (n, 3): χ = ± (r² + 2a²)/(r² + a²)^{3/2}, r = r₀ + a φ."""
+        """Return χ, ξ, τ [1/m] at lengths `arc` [m], shape (n, 3): χ = ± (r² + 2a²)/(r² + a²)^{3/2}, r = r₀ + a φ."""
         radius, growth = self.start_radius + self.growth * self.angle_at(arc), self.growth
         return _along_normal(_side(self.toward) * (radius**2 + 2.0 * growth**2) / (radius**2 + growth**2) ** 1.5)
 
@@ -266,7 +269,7 @@ class SpiralPath(Path):
 
 
 def faults_of_spiral(path: SpiralPath) -> list[Fault]:
-    """Radii that make it no spiral."""
+    """Return the radii that make it no spiral."""
     if math.isclose(path.start_radius, path.end_radius, rel_tol=ROUNDING):
         return [(("end_radius",), path.end_radius, "must differ from `start_radius`; with equal radii it is an `arc`")]
     return []
@@ -322,7 +325,7 @@ class HelixPath(Path):
         return self.angle * self.radius / self._slant
 
     def frames_at(self, normal: Array, arc: Array) -> Frames:
-        """Frames at lengths `arc` [m] from the start.
+        """Return the frames at lengths `arc` [m] from the start.
 
         With e₁ the direction from the axis to the start, e₂ that in which φ = s/√(r² + c²) grows, ρ = cos φ e₁ +
         sin φ e₂, ρ′ = ∂ρ/∂φ and the axis on the side ±1 of the normal,
@@ -338,7 +341,7 @@ class HelixPath(Path):
         return points, (self.radius * around + self._rise * axis) / self._slant, -side * outward
 
     def curvatures_at(self, normal: Array, arc: Array, over: float) -> Array:
-        """χ, ξ, τ [1/m] at lengths `arc` [m], shape (n, 3)."""
+        """Return χ, ξ, τ [1/m] at lengths `arc` [m], shape (n, 3)."""
         twist = self._rise if self.handedness == "right" else -self._rise
         rates = np.array([_side(self.toward) * self.radius, 0.0, twist]) / self._slant**2
         return np.ones((len(arc), 1)) * rates

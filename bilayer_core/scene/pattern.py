@@ -45,11 +45,11 @@ class Placement:
         return np.sign(np.linalg.det(self.matrix))
 
     def directions(self, vectors: Array) -> Array:
-        """Directions of the rod as those of the copy, shape (..., 3)."""
+        """Return the directions of the rod as those of the copy, shape (..., 3)."""
         return vectors @ self.matrix.swapaxes(-1, -2)
 
     def points(self, points: Array) -> Array:
-        """Points of the rod as those of the copy [m], shape (..., 3)."""
+        """Return the points of the rod as those of the copy [m], shape (..., 3)."""
         return (points - self.center) @ self.matrix.swapaxes(-1, -2) + self.center + self.shift
 
 
@@ -59,13 +59,15 @@ def placed(matrix: Any = None, center: Any = (0.0, 0.0, 0.0), shift: Any = (0.0,
 
 
 def stacked(places: Iterable[Placement]) -> Placement:
-    """Several placements as one, of which points and directions have a copy more in front: shape (n_place, n, 3)."""
+    """Return several placements as one, of which points and directions have a copy more in front: shape (n_place, n,
+    3).
+    """
     matrices, centers, shifts = zip(*((of.matrix, of.center, of.shift) for of in places), strict=True)
     return Placement(np.array(matrices), np.array(centers)[:, None], np.array(shifts)[:, None])
 
 
 def _turned(vector: Array) -> Array:
-    """Rotation matrix of a rotation vector [rad], shape (3, 3)."""
+    """Return the rotation matrix of a rotation vector [rad], shape (3, 3)."""
     rotation = rotation_matrix(vector)
     rotation[np.abs(rotation) < EXACT] = 0.0
     return rotation
@@ -257,7 +259,7 @@ coordinate do so along it."""
 
 
 def pair_at_one_place(copies: Array, tolerance: float) -> tuple[int, int] | None:
-    """Two copies that lie on each other, or None if there are none.
+    """Return two copies that lie on each other, or None if there are none.
 
     Those whose points agree, in either direction, agree in their middle. Where copies are in the order of their middles
     along a direction, only a few others can be between them: what is compared grows as their number, not its square.

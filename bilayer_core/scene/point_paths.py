@@ -49,7 +49,7 @@ class PointPath(Path):
     @model_validator(mode="before")
     @classmethod
     def _read(cls, data: Any, info: ValidationInfo) -> Any:
-        """Points and normals of the file, if one is given: a validated scene needs no further file."""
+        """Return the points and normals of the file, if one is given: a validated scene needs no further file."""
         if not isinstance(data, dict) or not isinstance(data.get("file"), str):
             return data
         given = [key for key in ("points", "normals") if data.get(key) is not None]
@@ -97,11 +97,11 @@ class PointPath(Path):
         return self.curve.sharpest
 
     def frames_at(self, normal: Array, arc: Array) -> Frames:
-        """Frames at lengths `arc` [m] from the start."""
+        """Return the frames at lengths `arc` [m] from the start."""
         return self.curve.frames(normal, arc)
 
     def curvatures_at(self, normal: Array, arc: Array, over: float) -> Array:
-        """χ, ξ, τ [1/m] at lengths `arc` [m], shape (n, 3)."""
+        """Return χ, ξ, τ [1/m] at lengths `arc` [m], shape (n, 3)."""
         return self.curve.curvatures(normal, arc, over)
 
     def demand_of_normal(self, normal: Array) -> str:
@@ -150,7 +150,7 @@ class SplinePath(PointPath):
 
 
 def points_of_file(table: CsvFile) -> dict[str, list[list[float]]]:
-    """Points and, if it has one of their columns, normals of a csv file."""
+    """Return the points and, if it has one of their columns, normals of a csv file."""
     columns = {"points": ("x", "y", "z")}
     if {"nx", "ny", "nz"} & set(table.columns):
         columns["normals"] = ("nx", "ny", "nz")
@@ -158,7 +158,7 @@ def points_of_file(table: CsvFile) -> dict[str, list[list[float]]]:
 
 
 def faults_of_points(path: PointPath) -> list[Fault]:
-    """Points that make no curve, and normals that make no frame."""
+    """Return the points that make no curve, and normals that make no frame."""
     least = 3 if path.shape == "spline" or path.closed else 2
     if path.points is None:
         return [(("points",), None, "must be given, or `file`")]

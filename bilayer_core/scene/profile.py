@@ -63,13 +63,13 @@ class _Varying:
 
 
 def varying(quantity: Any) -> Any:
-    """Annotation of a quantity, itself an annotation from `scene.units`, that may vary along the path."""
+    """Return the annotation of a quantity, itself an annotation from `scene.units`, that may vary along the path."""
     either = quantity | Profile[quantity]
     return Annotated[float | Profile[quantity], BeforeValidator(_Varying(quantity), json_schema_input_type=either)]
 
 
 def values_at(number_or_profile: float | Profile, along: np.ndarray) -> np.ndarray:
-    """Values at lengths `along` the path [m], of the same shape."""
+    """Return the values at lengths `along` the path [m], of the same shape."""
     if isinstance(number_or_profile, Profile):
         return np.interp(along, number_or_profile.at, number_or_profile.value)
     values = np.empty(along.shape)
@@ -78,7 +78,7 @@ def values_at(number_or_profile: float | Profile, along: np.ndarray) -> np.ndarr
 
 
 def means_between(number_or_profile: float | Profile, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Exact means over the spans of a path from `begin` to `end` [m], of the same shape."""
+    """Return the exact means over the spans of a path from `begin` to `end` [m], of the same shape."""
     if not isinstance(number_or_profile, Profile):
         return values_at(number_or_profile, begin)
     at, value = np.array(number_or_profile.at), np.array(number_or_profile.value)
@@ -97,6 +97,6 @@ def means_between(number_or_profile: float | Profile, begin: np.ndarray, end: np
 
 
 def extremes(number_or_profile: float | Profile) -> tuple[float, float]:
-    """Smallest and largest value."""
+    """Return the smallest and largest value."""
     values = number_or_profile.value if isinstance(number_or_profile, Profile) else [number_or_profile]
     return min(values), max(values)

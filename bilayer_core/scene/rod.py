@@ -122,16 +122,18 @@ class Rod(Part):
         return self.path.is_closed
 
     def on_path(self, stations: np.ndarray) -> np.ndarray:
-        """Stations, whole or not; on a closed path those beyond the last one as they are on the first round."""
+        """Return the stations, whole or not; on a closed path those beyond the last one as they are on the
+        first round.
+        """
         last = self.stations - 1
         return np.where(stations > last, stations - last, stations) if self.closed else stations
 
     def frames_at(self, arc: np.ndarray) -> Frames:
-        """Points [m], tangents and normals of the path at lengths `arc` [m] along it, shapes (n, 3)."""
+        """Return the points [m], tangents and normals of the path at lengths `arc` [m] along it, shapes (n, 3)."""
         return self.path.frames_at(np.array(self.normal), arc)
 
     def curvatures_at(self, arc: np.ndarray) -> np.ndarray:
-        """Curvature towards the normal and across, and twist of the path [1/m] there, shape (n, 3)."""
+        """Return the curvature towards the normal and across, and twist of the path [1/m] there, shape (n, 3)."""
         return self.path.curvatures_at(np.array(self.normal), arc, self.edge_length)
 
     @property
@@ -180,14 +182,14 @@ class Rod(Part):
         return tuple(found.values())
 
     def covered_stations(self, layer: Layer) -> tuple[int, int]:
-        """First and last station of `layer`, those nearest to its interval."""
+        """Return the first and last station of `layer`, those nearest to its interval."""
         if layer.interval is None:
             return 0, self.stations - 1
         first, last = (math.floor(length / self.edge_length + 0.5) for length in layer.interval)
         return first, last
 
     def span_of(self, layer: Layer, law: Eigenstrain | None = None) -> tuple[float, float]:
-        """Where `layer`, or a law of it, begins and ends, in stations, of which it may end between two."""
+        """Return where `layer`, or a law of it, begins and ends, in stations, of which it may end between two."""
         first, last = 0.0, float(self.stations - 1)
         for interval in (layer.interval, None if law is None else law.interval):
             if interval is not None:
@@ -201,7 +203,7 @@ class Rod(Part):
         return np.clip(np.minimum(edges + 1.0, last) - np.maximum(edges, first), 0.0, 1.0)
 
     def driven_edges(self, layer: Layer, law: Eigenstrain) -> range:
-        """Edges of the path that a law of `layer` drives, all or in part."""
+        """Return the edges of the path that a law of `layer` drives, all or in part."""
         first, last = self.span_of(layer, law)
         return range(math.floor(first), math.ceil(last)) if first < last else range(0)
 

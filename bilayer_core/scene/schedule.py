@@ -27,7 +27,7 @@ class Hold(Spans):
         return Span(math.inf, self.held_value)
 
     def points(self) -> dict[tuple[str | int, ...], float]:
-        """Values between which all others lie, by their keys."""
+        """Return the values between which all others lie, by their keys."""
         return {("value",): self.held_value}
 
 
@@ -60,7 +60,7 @@ class Ramp(Spans):
         return Span(math.inf, self.to_value)
 
     def points(self) -> dict[tuple[str | int, ...], float]:
-        """Values between which all others lie, by their keys."""
+        """Return the values between which all others lie, by their keys."""
         return {("from",): self.from_value, ("to",): self.to_value}
 
 
@@ -90,7 +90,7 @@ class Table(Spans):
         return Span(until, before, begin, (self.values[right] - before) / (until - begin))
 
     def points(self) -> dict[tuple[str | int, ...], float]:
-        """Values between which all others lie, by their keys."""
+        """Return the values between which all others lie, by their keys."""
         return {("values", index): value for index, value in enumerate(self.values)}
 
 
@@ -130,7 +130,7 @@ class Sequence(Spans):
         return Span(math.inf, part.schedule.value(part.duration))
 
     def points(self) -> dict[tuple[str | int, ...], float]:
-        """Values between which all others lie, by their keys."""
+        """Return the values between which all others lie, by their keys."""
         return {
             ("parts", index, "schedule", *key): value
             for index, part in enumerate(self.parts)
@@ -159,7 +159,7 @@ Sequence.model_rebuild()
 
 
 def faults_of_times(times: list[float], key: tuple[str], values: list) -> list[Fault]:
-    """Faults of a list of times [s] that has to increase and to be as long as the list under `key`."""
+    """Return the faults of a list of times [s] that has to increase and to be as long as the list under `key`."""
     faults: list[Fault] = [
         (("times", index), after, f"must be later than the time before it ({before:g} s)")
         for index, (before, after) in enumerate(zip(times, times[1:], strict=False), start=1)

@@ -80,7 +80,7 @@ class Spans(BaseModel):
         return self.span(t).value(t)
 
     def breakpoint_after(self, t: float) -> float:
-        """First corner or jump after `t` [s], infinity if there is none."""
+        """Return the first corner or jump after `t` [s], infinity if there is none."""
         return self.span(t).until
 
     def value_before(self, t: float, h: float) -> float:
@@ -97,7 +97,7 @@ class Spans(BaseModel):
         return abs(span.until - t) <= SAME * h and span.jump_to(self.span(span.until))
 
     def values_at(self, times: list[float], h: float) -> list[float]:
-        """`value` at increasing times about `h` [s] apart."""
+        """Return `value` at increasing times about `h` [s] apart."""
         found, span = [], self.span(times[0])
         for t in times:
             if t >= span.until - NEARLY * h:

@@ -73,7 +73,7 @@ class _Reader(_Base):
 
 
 def read_yaml(text: str, source: str) -> Any:
-    """Content of YAML text.
+    """Return the content of YAML text.
 
     Raises
     ------
@@ -129,6 +129,6 @@ def _refuse_deep(text: str, source: str) -> None:
 
 
 def write_yaml(data: dict) -> str:
-    """YAML text that `read_yaml` reads back to the same data, numbers bit for bit."""
+    """Return YAML text that `read_yaml` reads back to the same data, numbers bit for bit."""
     form = {"sort_keys": False, "default_flow_style": None, "allow_unicode": True, "width": TEXT_WIDTH}
     return yaml.dump(data, Dumper=_Writer, **form)

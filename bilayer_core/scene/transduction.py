@@ -11,7 +11,7 @@ import numpy as np
 
 
 def lagged(filtered, first, last, rising, falling, dt):
-    """First-order lag over a time, exact for a stimulus that is linear over it.
+    """Return the first-order lag over a time, exact for a stimulus that is linear over it.
 
     The solution of  T dy/dt = u - y  for u from u₀ to u₁ is, with x = dt/T and φ = (1 - exp(-x))/x,
 
@@ -44,7 +44,7 @@ def lagged(filtered, first, last, rising, falling, dt):
 
 
 def eigenstrain_of(filtered, gain, reference, saturation):
-    """Eigenstrain of a law: linear near the reference, with a smooth limit.
+    """Return the eigenstrain of a law: linear near the reference, with a smooth limit.
 
     η = S tanh(g (y - y0)/S), which tends to g (y - y0) for infinite S. Its slope is g (1 - (η/S)²): g at the
     reference, 0 far from it.
@@ -65,6 +65,6 @@ def eigenstrain_of(filtered, gain, reference, saturation):
 
 
 def free_strain(filtered: np.ndarray, gain, reference, saturation) -> np.ndarray:
-    """`eigenstrain_of` for each of some laws, shape (n,)."""
+    """Return `eigenstrain_of` for each of some laws, shape (n,)."""
     laws = np.broadcast(filtered, gain, reference, saturation)
     return np.array([eigenstrain_of(*(float(value) for value in law)) for law in laws], dtype=float)

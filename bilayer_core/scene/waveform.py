@@ -41,7 +41,7 @@ class Sine(Spans):
         return Span(until, self.mean, begin, 0.0, self.amplitude, 0.5 * math.pi / quarter, phase)
 
     def points(self) -> dict[tuple[str | int, ...], float]:
-        """Values between which all others lie, by their keys."""
+        """Return the values between which all others lie, by their keys."""
         return {
             ("mean + amplitude",): self.mean + self.amplitude,
             ("mean - amplitude",): self.mean - self.amplitude,
@@ -63,7 +63,7 @@ class _Pulses(Spans):
     """Of each flank, up and down; 0 switches at once."""
 
     def _span(self, t: float, width: float, last: float) -> Span:
-        """Span at time `t` of pulses that begin to fall after `width` [s]; they end after `last` periods."""
+        """Return the span at time `t` of pulses that begin to fall after `width` [s]; they end after `last` periods."""
         cycle, early = math.floor((t - self.start) / self.period + ROUNDING), ROUNDING * self.period
         if cycle < 0:
             return Span(self.start, self.low)
@@ -88,7 +88,7 @@ class _Pulses(Spans):
         return [(("rise_time",), self.rise_time, demand)]
 
     def points(self) -> dict[tuple[str | int, ...], float]:
-        """Values between which all others lie, by their keys."""
+        """Return the values between which all others lie, by their keys."""
         return {("low",): self.low, ("high",): self.high}
 
 

@@ -69,7 +69,7 @@ class CapturedFrame(Frame):
 
 
 def make_frame(stepper: Stepper, state: State, time: float, statistics: RunStatistics, cpu_time: float) -> Frame:
-    """Snapshot of the last accepted configuration."""
+    """Return the snapshot of the last accepted configuration."""
     capture = Capture(stepper, state)
     return CapturedFrame.of(
         capture,

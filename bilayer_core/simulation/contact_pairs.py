@@ -44,8 +44,8 @@ class ContactOwners:
         self.of_surface = np.array([slot[name] for name in model.surface_names], dtype=np.int64)
 
     def names_of(self, touching: Array) -> Pairs:
-        """Names of the pairs of what `engine.observables` saw touch: a rod comes before a body, and a body before an
-        obstacle.
+        """Return the names of the pairs of what `engine.observables` saw touch: a rod comes before a body, and a body
+        before an obstacle.
         """
         pairs = (divmod(code, self.count) for code in sorted(touching.tolist()))
         return tuple((self._names[a], self._names[b]) for a, b in pairs)

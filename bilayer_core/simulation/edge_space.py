@@ -75,7 +75,7 @@ def displacement(model: Model, start: Configuration, end: Configuration) -> Moti
 
 
 def velocity(model: Model, at: Configuration, state: State) -> Motion:
-    """Velocities of a state whose configuration is `at`."""
+    """Return the velocities of a state whose configuration is `at`."""
     world = np.zeros((1, 6))
     contact = np.concatenate([np.hstack([state.body_velocity, state.body_angular_velocity]), world])
     tangent = at.tangent[model.rods.edge_count :]

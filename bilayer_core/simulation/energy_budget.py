@@ -148,7 +148,7 @@ class EnergyLedger:
         self._last = after
 
     def budget(self) -> dict:
-        """Rows since `begin` [J].
+        """Return the rows since `begin` [J].
 
         Returns
         -------
@@ -207,7 +207,7 @@ class EnergyLedger:
         return work - 0.5 * float(np.vdot(pushed, before.velocity[held] + after.velocity[held]))
 
     def _force(self, name: str, at: Configuration) -> tuple[float, Gradient]:
-        """Energy [J] and derivatives of one force at a configuration."""
+        """Return the energy [J] and derivatives of one force at a configuration."""
         energy = self._evaluator.forces(at, (name,))[name]
         return energy, Gradient.copy_of(self._evaluator.sums, self._model)
 

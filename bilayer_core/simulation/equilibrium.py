@@ -222,7 +222,7 @@ class _Search:
         raise self._failure(f"the shape does not come to rest{hint}", moved)
 
     def _why(self, attempt: IntegrationReport) -> str:
-        """Why a round failed."""
+        """Return why a round failed."""
         if attempt.status != CROSSED:
             return FAILURES[attempt.status]
         edge, surface = crossed(self.stepper.model, attempt.pair)

@@ -20,7 +20,7 @@ WORLD = -1
 
 
 def joint_shapes(model: Model) -> tuple[JointInfo, ...]:
-    """Shapes of all joints and guides of a model."""
+    """Return the shapes of all joints and guides of a model."""
     return tuple([*_of_joints(model), *_of_guides(model)])
 
 

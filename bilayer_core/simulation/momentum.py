@@ -11,7 +11,9 @@ Array = np.ndarray
 
 
 def momentum_off_curve(model: Model, state: State) -> Array:
-    """Momentum of nodes that masses off the curve add to m v [N s], shape (n_node, 3); see `forces.raised`."""
+    """Return the momentum of nodes that masses off the curve add to m v [N s], shape (n_node, 3); see
+    `forces.raised`.
+    """
     raised, rates, momentum = model.raised, director_rates(model, state), np.zeros((model.node_count, 3))
     for half in range(raised.first_moment.shape[1]):
         np.add.at(momentum, model.rods.edge_node[raised.edge] + half, raised.first_moment[:, half, None] * rates)
@@ -19,13 +21,13 @@ def momentum_off_curve(model: Model, state: State) -> Array:
 
 
 def momentum_of(model: Model, state: State) -> Array:
-    """Momentum of rods and free bodies [N s], shape (3,)."""
+    """Return the momentum of rods and free bodies [N s], shape (3,)."""
     of_bodies = model.free_bodies.mass @ state.body_velocity[model.free_bodies.body_of_free]
     return model.rods.node_mass @ state.velocity + momentum_off_curve(model, state).sum(axis=0) + of_bodies
 
 
 def angular_momentum_of(model: Model, state: State) -> Array:
-    """Angular momentum of rods and free bodies about the origin [N m s], shape (3,)."""
+    """Return the angular momentum of rods and free bodies about the origin [N m s], shape (3,)."""
     rods, raised, free = model.rods, model.raised, model.free_bodies
     momentum = rods.node_mass[:, None] * state.velocity + momentum_off_curve(model, state)
     total = np.cross(state.position, momentum).sum(axis=0)

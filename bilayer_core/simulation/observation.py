@@ -86,7 +86,7 @@ def _shape_info(shape: Shape, position: Array | None = None, rotation: Array | N
 
 
 def positions_with_points(model: Model, state: State) -> Array:
-    """Positions of nodes, then of contact points of bodies [m], shape (n_node + n_point, 3)."""
+    """Return the positions of nodes, then of contact points of bodies [m], shape (n_node + n_point, 3)."""
     if not model.point_count:
         return state.position.copy()
     body, arms = _points(model, state)
@@ -103,14 +103,14 @@ def velocities_with_points(model: Model, state: State) -> Array:
 
 
 def _points(model: Model, state: State) -> tuple[Array, Array]:
-    """Body of each point, shape (n_point,), and its arm from the body's position [m], shape (n_point, 3)."""
+    """Return the body of each point, shape (n_point,), and its arm from the body's position [m], shape (n_point, 3)."""
     body = model.surfaces.point_body[: model.point_count]
     arms = np.einsum("kij,kj->ki", state.body_rotation[body], model.surfaces.point_position[: model.point_count])
     return body, arms
 
 
 def energies(model: Model, seen: Parts) -> dict[str, float]:
-    """Kinetic energies, and that of each conservative term, of a state that was looked at [J]."""
+    """Return the kinetic energies, and that of each conservative term, of a state that was looked at [J]."""
     kinetic, of_fluid = seen.kinetic.tolist()
     found = {"kinetic": kinetic, "fluid": of_fluid} if model.fluid.exists else {"kinetic": kinetic}
     values = seen.energy.tolist()

@@ -129,7 +129,7 @@ class PlaneWatch:
         return found
 
     def _leaving(self, state: State, rate: float) -> int:
-        """How many modes that leave the plane grow faster than a rate [1/s]; 0 if that cannot be told."""
+        """Return how many modes that leave the plane grow faster than a rate [1/s]; 0 if that cannot be told."""
         unstable = 0
         for stepper, of, sign in ((self._space, self._copy, 1), (self._plane, state, -1)):
             if not stepper.engine.do_once(of, COUNT, 1.0 / rate).converged:
@@ -150,7 +150,9 @@ class PlaneWatch:
 
 
 def turning_rate(stepper: Stepper, state: State) -> float:
-    """Rate at which turning out of its plane seems to grow [1/s] for a robot that no prescribed body holds, else 0."""
+    """Return the rate at which turning out of its plane seems to grow [1/s] for a robot that no prescribed body holds,
+    else 0.
+    """
     model, engine = stepper.model, stepper.engine
     if np.any(model.constrained.free < 0):
         return 0.0

@@ -133,7 +133,7 @@ def _controlled_body(model: Model, name: str) -> tuple[int, int, Prescribed]:
 
 
 def _aim(goal: Array, now: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Where a body is going, or is if it has no goal: position and rotation matrix."""
+    """Return where a body is going, or is if it has no goal: position and rotation matrix."""
     if goal[DURATION] == 0.0:
         return now
     return goal[POSITION] + goal[MOVE], rotation_matrix(goal[ROTATION_VECTOR]) @ goal[ROTATION].reshape(3, 3)
@@ -162,7 +162,7 @@ def _refuse_out_of_plane(model: Model, index: int, name: str, position: Array, r
 
 
 def rotation_vector_between(first: Array, last: Array) -> Array:
-    """Rotation vector of last firstᵀ [rad], by half a turn at most, shape (3,)."""
+    """Return the rotation vector of last firstᵀ [rad], by half a turn at most, shape (3,)."""
     quaternion = quaternion_from_matrix(last @ first.T)
     sine = float(np.linalg.norm(quaternion[:3]))
     if sine == 0.0:

@@ -16,7 +16,7 @@ def simpson(
     tolerance: float,
     halvings: int,
 ) -> Array:
-    """Integral by Simpson's rule, on halves where two of them differ from the whole by too much.
+    """Return the integral by Simpson's rule, on halves where two of them differ from the whole by too much.
 
     Parameters
     ----------

@@ -142,7 +142,7 @@ def _holds(model: Model, speed: float) -> bool:
 
 
 def _stiffness_that_holds(model: Model, speed: float) -> float:
-    """K_c [Pa] with which the barrier takes up the motion of what is heaviest."""
+    """Return K_c [Pa] with which the barrier takes up the motion of what is heaviest."""
     contact = model.scene.contact
     needed = stiffness_that_holds(0.5 * heaviest(model) * speed**2, contact.barrier_distance)
     return max(needed, MUCH_FASTER * model.contact_stiffness)

@@ -19,7 +19,7 @@ CURVATURE_BY_THICKNESS = f"curvature × thickness is above {THICK_CURVATURE:g}: 
 
 
 def center_of_mass(model: Model, state: State) -> np.ndarray:
-    """Mass centre of the rods [m], shape (3,)."""
+    """Return the mass centre of the rods [m], shape (3,)."""
     moment = model.rods.node_mass @ state.position
     moment += model.raised.first_moment.sum(axis=1) @ state.director1[model.raised.edge]
     return moment / model.rods.node_mass.sum()

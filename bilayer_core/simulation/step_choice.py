@@ -103,7 +103,7 @@ def choose_steps(scene: SceneConfig, method: Method, dt: float | None = None, to
 
 
 def _time_of_sound(scene: SceneConfig) -> float:
-    """Least time in which a stretching wave passes an edge [s]."""
+    """Return the least time in which a stretching wave passes an edge [s]."""
     return min(
         rod.path.length / (rod.stations - 1) * math.sqrt(material.density / material.youngs_modulus)
         for rod in scene.rods

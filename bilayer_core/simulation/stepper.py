@@ -173,8 +173,8 @@ class Stepper:
         return observables_of(self.model, owners.of_point, owners.of_surface, owners.count)
 
     def observe(self, state: State) -> tuple[Parts, np.ndarray]:
-        """Observables of a state that was reached or evaluated last, by their names in `engine.observables`, and the
-        numbers of the pairs that touch: copies.
+        """Return the observables of a state that was reached or evaluated last, by their names in `engine.observables`,
+        and the numbers of the pairs that touch: copies.
         """
         found, places = self._observables
         self.engine.observe(state, found)
@@ -273,7 +273,7 @@ class Stepper:
                 return found
 
     def _why(self, found: IntegrationReport, begin: float) -> str:
-        """Why a step from a time [s] on could not be made, and how close it came."""
+        """Return why a step from a time [s] on could not be made, and how close it came."""
         end = f"the step to t = {begin + found.length:.6g} s, tried down to {found.length:.3g} s"
         if found.status == TOO_INACCURATE:
             tolerance = self.steps.tolerance

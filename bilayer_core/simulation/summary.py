@@ -24,7 +24,8 @@ LARGE_NUMERICAL = 0.1
 
 
 def summarise(simulator: Any) -> dict:
-    """Figures of a run since its start; lengths in m, times in s, forces in N, energies in J, curvatures in 1/m.
+    """Return the figures of a run since its start; lengths in m, times in s, forces in N, energies in J, curvatures in
+    1/m.
 
     Of the run, over the start and the ends of all accepted steps: ``max_curvature`` (through the thickness),
     ``max_strain`` (of an edge, without its eigenstrain), ``max_fibre_strain`` (of the outermost fibres beyond the shape
@@ -166,7 +167,7 @@ def _motions(view: JointView | BodyView) -> dict[str, float]:
 
 
 def _bodies(simulator: Any) -> dict:
-    """Where each body began and is, and how nodes touched it."""
+    """Return where each body began and is, and how nodes touched it."""
     found = {}
     for index, name in enumerate(simulator.model.bodies.names):
         start, end = simulator.start_bodies[index], simulator.bodies[name].position

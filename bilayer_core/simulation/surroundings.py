@@ -55,8 +55,8 @@ class Surroundings:
         return _overridden(scheduled, state.override[: len(scheduled)], time)
 
     def load_factor(self, state: State, ended: float = 0.0) -> Array:
-        """Factor of each load in a state, shape (n_load,): at the end of a step of length `ended` [s] that from before
-        a jump there.
+        """Return the factor of each load in a state, shape (n_load,): at the end of a step of length `ended` [s] that
+        from before a jump there.
         """
         time = float(state.time[0])
         scheduled = [load.value_before(time, ended) if ended else load.value(time) for load in self._loads]

@@ -171,7 +171,9 @@ class GapCheck:
         return _largest(middle - way) + _largest(half)
 
     def _rod_gaps(self, sheet: Sheet, first: Array, second: Array) -> tuple[Array, Array]:
-        """Gap of each pair of edges, as if they were flat, or a lower bound above the barrier distance; their radii."""
+        """Return the gap of each pair of edges, as if they were flat, or a lower bound above the barrier distance;
+        their radii.
+        """
         bound, radii = sheet.apart_at_least(first, second)
         near = np.flatnonzero(bound < self._model.scene.contact.barrier_distance)
         bound[near] = sheet.apart_if_flat(first[near], second[near]) - radii[near]
@@ -229,7 +231,7 @@ class PairsOfEdges:
             self.count = len(self._all[0])
 
     def at(self, nodes: Array) -> tuple[Array, Array]:
-        """Two arrays of edges, all pairs that may be nearer than the barrier distance among them; nodes [m]."""
+        """Return two arrays of edges, all pairs that may be nearer than the barrier distance among them; nodes [m]."""
         if self._all is not None:
             return self._all
         edge = self._model.rods.edge_node
@@ -250,7 +252,7 @@ class PairsOfEdges:
             self._left_out = self._number(first[out], second[out])
 
     def length_between(self, first: Array, second: Array) -> Array:
-        """Length of rod between two edges [m], infinite between rods."""
+        """Return the length of rod between two edges [m], infinite between rods."""
         surfaces = self._model.rod_search
         same = surfaces.edge_rod[first] == surfaces.edge_rod[second]
         arc = surfaces.edge_arc.mean(axis=1)

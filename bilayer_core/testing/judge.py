@@ -161,7 +161,7 @@ class _Momentum:
         self._time, self._velocity = frame.time, self._mean()
 
     def _mean(self) -> np.ndarray:
-        """Velocity of the mass centre [m/s], shape (3,)."""
+        """Return the velocity of the mass centre [m/s], shape (3,)."""
         model = self._simulator.model
         return self._simulator.momentum / (model.rods.node_mass.sum() + model.free_bodies.mass.sum())
 

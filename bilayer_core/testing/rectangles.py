@@ -55,7 +55,7 @@ def apart(first: Rectangles, second: Rectangles) -> Array:
 
 
 def _from_corners(one: Rectangles, other: Rectangles) -> Array:
-    """Distance of the nearest corner of one from the other."""
+    """Return the distance of the nearest corner of one from the other."""
     away = one.corners - other.middle[:, None]
     square = (other.half**2).sum(axis=2)
     part = np.clip(np.einsum("nkd,njd->nkj", away, other.half) / np.maximum(square, 1e-300)[:, None], -1.0, 1.0)
@@ -63,7 +63,7 @@ def _from_corners(one: Rectangles, other: Rectangles) -> Array:
 
 
 def _of_lines(a: Array, b: Array, c: Array, d: Array) -> Array:
-    """Distance of segments ab and cd, each of shape (n, 3)."""
+    """Return the distance of segments ab and cd, each of shape (n, 3)."""
     u, v, w = b - a, d - c, a - c
     uu, uv, vv, uw, vw = ((p * q).sum(axis=1) for p, q in ((u, u), (u, v), (v, v), (u, w), (v, w)))
     across = uu * vv - uv * uv

@@ -41,7 +41,7 @@ class BodyPoints:
         self.slot = np.concatenate([shown, np.full(len(self._balls), -1)])
 
     def places(self, frame: Frame) -> Array:
-        """Where they are [m], shape (n_point, 3)."""
+        """Return where they are [m], shape (n_point, 3)."""
         return np.concatenate([frame.positions[self._nodes :], frame.body_positions[self._balls]])
 
 
@@ -101,7 +101,7 @@ class MetSurface:
 
 
 def surfaces_of(model: Model, points: BodyPoints) -> list[MetSurface]:
-    """All surfaces that anything can meet."""
+    """Return all surfaces that anything can meet."""
     if model.scene.contact is None or not model.has_surface_contact:
         return []
     found = []

@@ -114,7 +114,7 @@ class Trial:
 
 
 def distance_of(first: Frame, second: Frame) -> float:
-    """Largest distance of a node or a body of one frame from where it is in the other [m]."""
+    """Return the largest distance of a node or a body of one frame from where it is in the other [m]."""
     apart = [np.linalg.norm(first.positions - second.positions, axis=1)]
     apart.append(np.linalg.norm(first.body_positions - second.body_positions, axis=1))
     return float(np.concatenate(apart).max())

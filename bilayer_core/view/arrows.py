@@ -61,7 +61,7 @@ def reaction_references(run: RunData, size: float) -> dict[str, float]:
 
 
 def scaled_reactions(run: RunData, scales: Scales, references: Mapping[str, float]) -> dict[str, Arrows]:
-    """Arrows of these sizes."""
+    """Return the arrows of these sizes."""
     found = {}
     for name, reference in references.items():
         scale = metres_per(reference, scales.size)
@@ -71,5 +71,5 @@ def scaled_reactions(run: RunData, scales: Scales, references: Mapping[str, floa
 
 
 def metres_per(reference: float, size: float) -> float:
-    """Length of arrows by the size that they are scaled by, for a robot of a size [m]: [m/N] or [1/N]."""
+    """Return the length of arrows by the size that they are scaled by, for a robot of a size [m]: [m/N] or [1/N]."""
     return 1.0 / rounded_up(reference / (ARROW_SHARE * size))

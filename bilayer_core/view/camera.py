@@ -132,7 +132,7 @@ def _number(text: str, unit: str, whole: str) -> float:
 def shots(
     camera: Camera, groups: list[np.ndarray], followed: list[np.ndarray], aspect: float, insets: Insets, rate: float
 ) -> list[Shot]:
-    """Where the eye is in each picture of a film, so that all is seen, as near as that allows.
+    """Return where the eye is in each picture of a film, so that all is seen, as near as that allows.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def is_worth_following(far: float, near: float) -> bool:
 
 
 def _smooth_way(groups: list[np.ndarray], rate: float) -> np.ndarray:
-    """Middle of the robot over time, smoothed [m], shape (pictures, 3)."""
+    """Return the middle of the robot over time, smoothed [m], shape (pictures, 3)."""
     from scipy.ndimage import gaussian_filter1d
 
     middles = np.array([0.5 * (points.min(axis=0) + points.max(axis=0)) for points in groups])
@@ -172,7 +172,7 @@ def _smooth_way(groups: list[np.ndarray], rate: float) -> np.ndarray:
 
 
 def _along(camera: Camera, way: np.ndarray, groups: list[np.ndarray], aspect: float, insets: Insets) -> list[Shot]:
-    """Shots of an eye that goes along a way and sees all points from wherever it is."""
+    """Return the shots of an eye that goes along a way and sees all points from wherever it is."""
     axes = camera.axes
     points = np.concatenate([points - at for points, at in zip(groups, way, strict=True)]) @ axes.T
     x, y, z = points.T

@@ -66,7 +66,7 @@ class Colouring:
         return _values(run, layer, self.quantity)
 
     def colours(self, values: np.ndarray) -> np.ndarray:
-        """SRGBA from 0 to 1 of values, float32, shape + (4,)."""
+        """Return SRGBA from 0 to 1 of values, float32, shape + (4,)."""
         return map_colours(values, -self.limit if self.diverging else 0.0, self.limit, self.colour_map)
 
     def sentence(self) -> str:
@@ -78,7 +78,7 @@ class Colouring:
 
 
 def choose_colouring(run: RunData, quantity: str = STRAIN) -> Colouring:
-    """Colours that suit a run."""
+    """Return the colours that suit a run."""
     found = np.concatenate([np.abs(_values(run, layer, quantity)).ravel() for layer in run.description.layers])
     found = found[np.isfinite(found)]
     least = SMALLEST[quantity]
@@ -93,7 +93,7 @@ def choose_colouring(run: RunData, quantity: str = STRAIN) -> Colouring:
 
 
 def colouring_up_to(quantity: str, limit: float, exceeded: bool = False) -> Colouring:
-    """Colours with a given limit, in SI units."""
+    """Return the colours with a given limit, in SI units."""
     if quantity == STRAIN:
         title, shown = "axial strain [%]", f"{100 * limit:.4g}"
     elif quantity == CURVATURE:

@@ -15,7 +15,7 @@ CORNERS = len(_CORNERS)
 
 
 def rotated(quaternions: np.ndarray, axis: int) -> np.ndarray:
-    """Column `axis` of the rotation matrices of unit quaternions x y z w, shape (..., 3)."""
+    """Return the column `axis` of the rotation matrices of unit quaternions x y z w, shape (..., 3)."""
     x, y, z, w = np.moveaxis(quaternions, -1, 0)
     columns = (
         (1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)),
@@ -26,7 +26,7 @@ def rotated(quaternions: np.ndarray, axis: int) -> np.ndarray:
 
 
 def ribbon_vertices(strand: Strand, positions: np.ndarray, material_frames: np.ndarray) -> np.ndarray:
-    """Corners of the cross-sections of a ribbon over time.
+    """Return the corners of the cross-sections of a ribbon over time.
 
     Parameters
     ----------
@@ -56,7 +56,9 @@ def ribbon_normals(material_frames: np.ndarray) -> np.ndarray:
 
 
 def ribbon_triangles(nodes: int) -> np.ndarray:
-    """Vertex indices of the surface of a ribbon with its ends closed, for vertices as above, shape (triangles, 3)."""
+    """Return the vertex indices of the surface of a ribbon with its ends closed, for vertices as above, shape
+    (triangles, 3).
+    """
     last = CORNERS * (nodes - 1)
     ends = np.array([FIRST_END, [last + corner for corner in LAST_END]])
     return np.concatenate([ribbon_faces(nodes), two_triangles(ends)])
@@ -82,7 +84,7 @@ SLIMMEST_ARROW = 0.06  # radius of the shaft of a short arrow, in lengths of it
 
 
 def arrow_mesh(origins: np.ndarray, vectors: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Arrows with heads three times as wide as their shafts, which have one radius unless they are short.
+    """Return the arrows with heads three times as wide as their shafts, which have one radius unless they are short.
 
     Parameters
     ----------
@@ -199,7 +201,9 @@ def _box_patches(core: np.ndarray, rounding: float):
 
 
 def shape_extent(shape: ShapeInfo) -> np.ndarray:
-    """Corners of a box that holds a shape, in the frame of its owner [m], shape (8, 3); its position for a plane."""
+    """Return the corners of a box that holds a shape, in the frame of its owner [m], shape (8, 3); its position for a
+    plane.
+    """
     rotation = np.stack([rotated(np.array(shape.quaternion), axis) for axis in range(3)])
     signs = np.array(np.meshgrid([-0.5, 0.5], [-0.5, 0.5], [-0.5, 0.5])).reshape(3, -1).T
     return np.array(shape.position) + (signs * np.array(shape.size)) @ rotation

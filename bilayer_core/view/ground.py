@@ -108,7 +108,7 @@ def add_plane(renderer: Any, plane: ShapeInfo, ground: Ground, theme: Theme) -> 
 
 
 def _square(x: float, y: float, radius: float) -> Any:
-    """Two triangles that hold the disc [squares]."""
+    """Return two triangles that hold the disc [squares]."""
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 

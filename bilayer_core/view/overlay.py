@@ -122,5 +122,5 @@ def round_length(metres: float) -> tuple[float, str]:
 
 @cache
 def font_of(size: int) -> ImageFont.FreeTypeFont:
-    """Pillow's own font, which has the characters of ASCII and few more."""
+    """Return Pillow's own font, which has the characters of ASCII and few more."""
     return ImageFont.load_default(size)

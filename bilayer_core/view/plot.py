@@ -275,14 +275,14 @@ def _label(own: list[str], unit: str) -> str:
 
 
 def _without_common(names: list[str]) -> dict[str, str]:
-    """Names without the words that all begin with: ``kinetic`` of ``energy/kinetic``, ``fx`` of ``….fx``."""
+    """Return the names without the words that all begin with: ``kinetic`` of ``energy/kinetic``, ``fx`` of ``….fx``."""
     common = os.path.commonprefix(names)
     cut = max(common.rfind("/"), common.rfind(".")) + 1
     return {name: name[cut:] for name in names}
 
 
 def _prefix(unit: str, held: list[Line]) -> tuple[float, str]:
-    """Factor and SI prefix by which the largest value of a panel is at least 1."""
+    """Return the factor and SI prefix by which the largest value of a panel is at least 1."""
     if unit not in WITH_PREFIX:
         return 1.0, ""
     finite = [np.abs(line.values[np.isfinite(line.values)]).max(initial=0.0) for line in held]
@@ -317,6 +317,6 @@ def _split(asked: str, run: RunData) -> tuple[str, str]:
 
 
 def _short_names(logs: Sequence[str | Path]) -> list[str]:
-    """Names of the logs' files, with their directories where those are the same."""
+    """Return the names of the logs' files, with their directories where those are the same."""
     stems = [Path(log).stem for log in logs]
     return stems if len(set(stems)) == len(stems) else [str(Path(log).with_suffix("")) for log in logs]

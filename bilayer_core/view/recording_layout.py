@@ -59,8 +59,8 @@ class Plot:
 
 
 def energy_groups(run: RunData, known: Collection[str] = ()) -> dict[str, dict[str, np.ndarray]]:
-    """Energies that ever act, or are `known` to, by name of the axes that show them [mJ]: gravity, whose zero is
-    anywhere, would flatten the others.
+    """Return the energies that ever act, or are `known` to, by name of the axes that show them [mJ]: gravity, whose
+    zero is anywhere, would flatten the others.
     """
     acting = {name: 1e3 * values for name, values in run.energy.items() if name in known or np.any(values)}
     groups = {

@@ -156,7 +156,7 @@ class Studio:
     def pictures(
         self, times: Sequence[float], insets: Insets, rate: float, texts: list[str], longest: int | None = None
     ) -> Iterator[Image.Image]:
-        """Pictures at `times` [s], with all that is written on them.
+        """Return the pictures at `times` [s], with all that is written on them.
 
         Parameters
         ----------

@@ -217,7 +217,7 @@ class RunSender:
             self._send_curve("contact_force", SUMMED, run.shape_times, total)
 
     def _sizes(self, group: str, run: RunData, wrenches: np.ndarray) -> dict[str, np.ndarray]:
-        """How large the forces on each body are that any acts on, or has acted on [N]."""
+        """Return how large the forces on each body are that any acts on, or has acted on [N]."""
         sizes = {
             f"on {body.name}": np.linalg.norm(wrenches[:, i, :3], axis=1)
             for i, body in enumerate(run.description.bodies)
@@ -248,7 +248,7 @@ class RunSender:
 
 
 def _strand(layer: Strand) -> str:
-    """Entity of a layer of a rod."""
+    """Return the entity of a layer of a rod."""
     return f"world/strands/{layer.name}"
 
 
@@ -261,7 +261,7 @@ def _time(times: np.ndarray) -> list[rr.TimeColumn]:
 
 
 def _health(solver: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Curves of the solver's figures, as far as the log has them."""
+    """Return the curves of the solver's figures, as far as the log has them."""
     curves = {}
     if "iterations" in solver and "substeps" in solver:
         curves["iterations per step"] = solver["iterations"] / np.maximum(solver["substeps"], 1)
@@ -271,7 +271,7 @@ def _health(solver: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def _bytes(colours: np.ndarray) -> np.ndarray:
-    """Colours from 0 to 1 as uint8."""
+    """Return the colours from 0 to 1 as uint8."""
     return np.rint(colours * 255).astype(np.uint8)
 
 

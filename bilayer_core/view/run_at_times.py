@@ -75,7 +75,9 @@ class Moments:
         )
 
     def robot_points(self, moment: Moment) -> np.ndarray:
-        """Points of the rods, of the bodies that hold them and of the bodies beside them [m], shape (points, 3)."""
+        """Return the points of the rods, of the bodies that hold them and of the bodies beside them [m], shape (points,
+        3).
+        """
         points = [self._rod_points(moment)]
         middle, size = points[0].mean(axis=0), float(np.ptp(points[0], axis=0).max())
         for index, body in enumerate(self._run.description.bodies):

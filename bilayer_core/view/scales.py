@@ -61,7 +61,7 @@ class Scales:
 
 
 def choose_scales(run: RunData) -> Scales:
-    """Scales that suit a run."""
+    """Return the scales that suit a run."""
     size = max(float(np.ptp(run.positions[0], axis=0).max()), SMALLEST_SIZE)
     strain = max(*(float(np.abs(run.strain_of(layer)).max()) for layer in run.description.layers), SMALLEST_STRAIN)
     reference = reference_of(run.contact_forces)
@@ -83,14 +83,14 @@ def choose_scales(run: RunData) -> Scales:
 
 
 def middles_of(run: RunData) -> np.ndarray:
-    """Middle of the box about the rods over time [m], shape (shapes, 3)."""
+    """Return the middle of the box about the rods over time [m], shape (shapes, 3)."""
     of_rods = _of_rods(run)
     return 0.5 * (of_rods.min(axis=1) + of_rods.max(axis=1)).astype(float)
 
 
 def place_moving_eye(run: RunData) -> tuple[np.ndarray, np.ndarray]:
-    """Eye and what it looks at in the first frame, of one that then moves as the middle of the robot does: as near as
-    the rods are in the picture all the time.
+    """Return the eye and what it looks at in the first frame, of one that then moves as the middle of the robot does:
+    as near as the rods are in the picture all the time.
     """
     middles = middles_of(run)
     every = slice(None, None, max(1, len(middles) // VIEW_FRAMES))
@@ -120,7 +120,8 @@ def reference_of(forces: np.ndarray) -> float:
 def visible_points(
     run: RunData, shapes: slice | np.ndarray, frames: slice | np.ndarray, metres_per_newton: float
 ) -> np.ndarray:
-    """Points that a picture must hold: nodes, tips of arrows, boxes about bodies and obstacles [m], shape (points, 3).
+    """Return the points that a picture must hold: nodes, tips of arrows, boxes about bodies and obstacles [m], shape
+    (points, 3).
 
     `shapes` and `frames` choose among `run.shape_times` and `run.times`.
     """
@@ -136,7 +137,9 @@ def visible_points(
 
 
 def seen_from(eye: np.ndarray, target: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Slopes of the lines of sight to `points`: to the right and upwards of the target, shape (points, 2)."""
+    """Return the slopes of the lines of sight to `points`: to the right and upwards of the target, shape
+    (points, 2).
+    """
     axes = _picture_axes((eye - target) / np.linalg.norm(eye - target))
     relative = (points - eye) @ axes.T
     return relative[:, :2] / -relative[:, 2:]
@@ -150,7 +153,7 @@ def _picture_axes(back: np.ndarray) -> np.ndarray:
 
 
 def place_eye(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Nearest place along `VIEW_DIRECTION` from which all `points` are in the picture, and what it looks at.
+    """Return the nearest place along `VIEW_DIRECTION` from which all `points` are in the picture, and what it looks at.
 
     Parameters
     ----------

@@ -156,7 +156,7 @@ def _bracketed(host: str) -> str:
 
 
 def _free_port(bind: str, first: int, option: str, but: int | None = None) -> int:
-    """`first` itself if an option asks for it, else the first free port from there on."""
+    """Return `first` itself if an option asks for it, else the first free port from there on."""
     for port in range(first, first + 1 if option else first + PORTS_TRIED):
         if port == but:
             continue

@@ -24,18 +24,18 @@ TEXT = 16  # size of text in the footer and of times [pixels]
 
 
 def decimals_for(times: list[float]) -> int:
-    """Decimals with which all times differ from one another, 1 to 4."""
+    """Return the decimals with which all times differ from one another, 1 to 4."""
     return next((n for n in range(1, 4) if len({f"{time:.{n}f}" for time in times}) == len(set(times))), 4)
 
 
 def columns_for(count: int, width: int, height: int) -> int:
-    """Columns of a sheet without an empty place whose shape is nearest to `SHEET_ASPECT`."""
+    """Return the columns of a sheet without an empty place whose shape is nearest to `SHEET_ASPECT`."""
     divisors = [columns for columns in range(1, count + 1) if count % columns == 0]
     return min(divisors, key=lambda c: abs(math.log(c * width / (count / c * height) / SHEET_ASPECT)))
 
 
 def layout_of(count: int, width: int, height: int) -> tuple[int, float]:
-    """Columns of a sheet of so many pictures, and how much smaller they are on it."""
+    """Return the columns of a sheet of so many pictures, and how much smaller they are on it."""
     columns = columns_for(count, width, height)
     return columns, min(1.0, (SHEET_WIDTH - GAP * (columns - 1)) / (columns * width))
 

@@ -192,7 +192,7 @@ class Stage:
         return actor, geometry.shape_extent(shape)
 
     def _add_fixed(self) -> np.ndarray:
-        """Corners of boxes round all that has edges and does not move [m], shape (points, 3)."""
+        """Return the corners of boxes round all that has edges and does not move [m], shape (points, 3)."""
         found = [np.zeros((0, 3))]
         for obstacle in self._run.description.obstacles:
             if obstacle.shape.kind != "plane":
@@ -203,7 +203,7 @@ class Stage:
         return np.concatenate(found)
 
     def _add_moving(self) -> list[tuple[Any, np.ndarray, int]]:
-        """Bodies as they are, and joints on them; a body without a surface has nothing to draw."""
+        """Return the bodies as they are, and joints on them; a body without a surface has nothing to draw."""
         of = self._run.description
         bodies = [
             (*self._add_shape(body.shape, BALL_COLOURS), index)
@@ -221,7 +221,7 @@ class Stage:
         return position + corners @ axes
 
     def _chain_layers(self) -> tuple[Strand, np.ndarray, np.ndarray]:
-        """All layers as if they were one, and the rows and nodes that their cross-sections have in a moment."""
+        """Return all layers as if they were one, and the rows and nodes that their cross-sections have in a moment."""
         layers = self._run.description.layers
         parts = {name: [getattr(of, name) for of in layers] for name in ("width", "thickness", "offset")}
         rows = np.concatenate([np.arange(part.start, part.stop) for part in self._moments.rows])
@@ -301,7 +301,7 @@ def _equal(first: Shot, second: Shot) -> bool:
 
 
 def _poly_data(vertices: np.ndarray, normals: np.ndarray | None, colours: np.ndarray, triangles: np.ndarray) -> Any:
-    """Triangles for VTK."""
+    """Return the triangles for VTK."""
     from vtkmodules.util.numpy_support import numpy_to_vtkIdTypeArray
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData

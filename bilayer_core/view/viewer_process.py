@@ -45,7 +45,7 @@ def show(recording: Path) -> None:
 
 
 def take_picture(recording: Path, time: float | None = None) -> bytes:
-    """PNG of a recording at `time` [s] (default: its end)."""
+    """Return PNG of a recording at `time` [s] (default: its end)."""
     with HeadlessViewer() as viewer:
         viewer.open(recording)
         viewer.set_time(time)
@@ -66,7 +66,7 @@ def viewer_executable() -> Path:
 
 
 def viewer_environment() -> dict[str, str]:
-    """Environment of the viewer: it sends no usage statistics where CI is set, and asks no questions."""
+    """Return the environment of the viewer: it sends no usage statistics where CI is set, and asks no questions."""
     return {**os.environ, "CI": "true", "RERUN_APP_ONLY": "true", "NO_COLOR": "1"}
 
 
@@ -137,8 +137,8 @@ class HeadlessViewer:
         self.client.set_time(TIMELINE, duration=float(time), play_state="paused")
 
     def picture(self, view: str | None = None, period: float = DRAW_PERIOD) -> bytes:
-        """PNG of the whole viewer or of the view with this name, taken once two looks, a `period` [s] apart, show the
-        same. The viewer draws anew for each look; once it has loaded all meshes, a short period will do.
+        """Return PNG of the whole viewer or of the view with this name, taken once two looks, a `period` [s] apart,
+        show the same. The viewer draws anew for each look; once it has loaded all meshes, a short period will do.
         """
         deadline = clock.monotonic() + DRAW_LIMIT
         shown = None

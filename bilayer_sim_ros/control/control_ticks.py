@@ -104,7 +104,7 @@ class Control:
         self._commanded = self._commanded or applied or bool(self._inputs.heard)
 
     def next_stop(self, time: float) -> float:
-        """Where adaptive steps from `time` [s] on end at the latest [s]."""
+        """Return where adaptive steps from `time` [s] on end at the latest [s]."""
         return self._ticks.next_end(time) if self._commanded or self._lockstep is not None else math.inf
 
     def opens_tick(self, time: float) -> bool:
@@ -130,7 +130,7 @@ class Control:
 
 
 def tick_rate(control_period: float, rate: float, shortest: float) -> float:
-    """Ticks per simulated second [Hz].
+    """Return the ticks per simulated second [Hz].
 
     Parameters
     ----------

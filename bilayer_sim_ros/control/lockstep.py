@@ -55,8 +55,8 @@ class Lockstep:
 
 
 def channels_that_answer(names: Sequence[str], channels: Sequence[str], bodies: Sequence[str] = ()) -> list[str]:
-    """`names` of the parameter ``lockstep_answers``, without empty ones; InputError if one is no channel and no pose of
-    a body that controllers may move, or twice.
+    """Return `names` of the parameter ``lockstep_answers``, without empty ones; InputError if one is no channel and no
+    pose of a body that controllers may move, or twice.
     """
     allowed = [*channels, *map(mount, bodies)]
     needed = [name for name in names if name]

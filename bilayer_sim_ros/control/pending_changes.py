@@ -85,6 +85,6 @@ class Commands:
 
 
 def position_and_quaternion(pose: Pose) -> tuple[Sequence[float], Sequence[float]]:
-    """Position [m] and orientation x y z w of a message."""
+    """Return the position [m] and orientation x y z w of a message."""
     at, turned = pose.position, pose.orientation
     return (at.x, at.y, at.z), (turned.x, turned.y, turned.z, turned.w)

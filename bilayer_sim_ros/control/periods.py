@@ -26,7 +26,7 @@ class Periods:
         self._start = time
 
     def complete(self, time: float) -> int:
-        """How many have ended at `time` [s], to rounding."""
+        """Return how many have ended at `time` [s], to rounding."""
         return math.floor((time - self._start) * self.rate + ROUNDING)
 
     def next_end(self, time: float) -> float:

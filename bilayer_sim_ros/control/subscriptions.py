@@ -135,7 +135,7 @@ def subscribe_commands(node: Node, commands: Commands, inputs: StimulusInputs, m
 
 
 def controlled_bodies(model: Model) -> list[str]:
-    """Names of bodies that controllers may move."""
+    """Return the names of bodies that controllers may move."""
     return [model.bodies.names[index] for index in model.bodies.controlled]
 
 

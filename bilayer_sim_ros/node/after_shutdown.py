@@ -27,7 +27,7 @@ def is_valid(node: Node) -> bool:
 
 
 def while_valid(node: Node, publish: Callable[Arguments, None]) -> Callable[Arguments, None]:
-    """`publish`, which does nothing when the node's context has been shut down."""
+    """Return `publish`, which does nothing when the node's context has been shut down."""
 
     def publish_or_not(*arguments: Arguments.args, **named: Arguments.kwargs) -> None:
         try:

@@ -35,7 +35,7 @@ def describe(parameter: NodeParameter) -> str:
 
 
 def parameters_of(table: Iterable[NodeParameter], given: Mapping[str, str]) -> dict[str, Value]:
-    """Values of parameters whose arguments are not empty.
+    """Return the values of parameters whose arguments are not empty.
 
     Parameters
     ----------

@@ -65,7 +65,7 @@ class NodeParameter:
         return f"a finite number {'>' if self.above_minimum else '>='} {self.minimum:g}{below}"
 
     def accept(self, value: object) -> Value:
-        """`value` as the parameter's type, or InputError; an integer will do for a number, and for a choice."""
+        """Return `value` as the parameter's type, or InputError; an integer will do for a number, and for a choice."""
         if self.choices and isinstance(value, int) and not isinstance(value, bool):
             value = str(value)
         if isinstance(self.default, list) and isinstance(value, str):
@@ -90,7 +90,7 @@ class NodeParameter:
 
 
 def accept_all(table: Iterable[NodeParameter], overrides: Mapping[str, object]) -> dict[str, Value]:
-    """Values of all parameters in `table`: the default, or what `overrides` says.
+    """Return the values of all parameters in `table`: the default, or what `overrides` says.
 
     Raises
     ------

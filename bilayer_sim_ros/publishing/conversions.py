@@ -45,7 +45,7 @@ def status_without_run(message: str, name: str) -> DiagnosticArray:
 
 
 def to_diagnostics(status: Status, name: str, ignored: Mapping[str, int]) -> DiagnosticArray:
-    """How the run is doing.
+    """Return how the run is doing.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ from bilayer_sim_ros.publishing.live_topic import LivePublisher
 
 
 def quality_of_service(spec: TopicSpec) -> QoSProfile:
-    """Reliable and volatile, with the topic's depth."""
+    """Return the reliable and volatile, with the topic's depth."""
     return QoSProfile(depth=spec.depth, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)
 
 

@@ -66,5 +66,5 @@ class LogClock:
         self.running = False
 
     def until(self, time: int) -> float:
-        """Seconds until `time` [ns] of the log while the clock runs; below 0 if it is past."""
+        """Return the seconds until `time` [ns] of the log while the clock runs; below 0 if it is past."""
         return self._since + (time - self._time) / NANOSECONDS / self._rate - self._clock()

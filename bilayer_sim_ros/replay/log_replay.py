@@ -126,7 +126,7 @@ def playback_of(log: IndexedLog, parameters: Mapping[str, Value]) -> Playback:
 
 
 def trigger_services(player: Player) -> list[Service]:
-    """Services whose requests say nothing, and whose answers are a success and a text."""
+    """Return the services whose requests say nothing, and whose answers are a success and a text."""
 
     def say_whether_paused(response: Trigger.Response, future: Future) -> None:
         try:

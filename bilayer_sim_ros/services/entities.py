@@ -60,7 +60,7 @@ class Entities:
         self.names = [*self._bodies, *self._first_nodes]
 
     def states(self, simulator: Simulator, names: Iterable[str]) -> list[tuple[str, EntityState]]:
-        """States by name."""
+        """Return the states by name."""
         frame = simulator.frame()
         self._nodes.update(frame)
         found = []

@@ -17,7 +17,7 @@ from bilayer_sim_ros.services.trigger_services import Service
 
 
 def rosbag2_services(node: Node, player: Player) -> list[Service]:
-    """All services of rosbag2's player.
+    """Return all services of rosbag2's player.
 
     Raises
     ------

@@ -64,7 +64,7 @@ class Result:
 def simulator_services(
     node: Node, worker: Worker, description: Description, quit: Callable[[str], None]
 ) -> list[Service]:
-    """All of them, or none where their types are not installed; the console says which.
+    """Return all of them, or none where their types are not installed; the console says which.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def _change(worker: Worker, wished: int, present: int) -> Future:
 
 
 def _steps(worker: Worker, count: int) -> Future:
-    """Several steps, one after the other; the first that is refused ends them."""
+    """Return several steps, one after the other; the first that is refused ends them."""
     whole: Future = Future()
     left = count
 
@@ -208,7 +208,7 @@ def _steps(worker: Worker, count: int) -> Future:
 
 
 def _filtered(entities: Entities, filters: Any) -> tuple[list[str], Result]:
-    """Names that a filter leaves, and whether it is one."""
+    """Return the names that a filter leaves, and whether it is one."""
     if filters.categories or filters.tags.tags or filters.bounds.type:
         return [], Result(UNSUPPORTED, NOT_FILTER)
     try:

@@ -19,7 +19,9 @@ from bilayer_core.model.records.status import READY
 
 @kernel
 def stencil_rows(surfaces, strands, i, rows_out):
-    """Rows in the matrix of the unknowns of the stencil of node i, −1 where there is no edge; returns how many."""
+    """Write the rows in the matrix of the unknowns of the stencil of node i, −1 where there is no edge; returns how
+    many.
+    """
     dimension, before, after = strands.dimension, surfaces.node_edges[i, 0], surfaces.node_edges[i, 1]
     if before == after:
         before = before if strands.edge_node[before] != i else -1

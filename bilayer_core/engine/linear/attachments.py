@@ -47,7 +47,7 @@ def condense_gradient(constrained, strands, at, sums):
 
 @kernel
 def arm_jacobian(axes, arm, k, c, n):
-    """Entry (c, n) of ∂(a_c·x)/∂(X, φ) = [a_cᵀ, (ρ × a_c)ᵀ] for the direction a_c of an unknown."""
+    """Return the entry (c, n) of ∂(a_c·x)/∂(X, φ) = [a_cᵀ, (ρ × a_c)ᵀ] for the direction a_c of an unknown."""
     if n < 3:
         return axes[c, n]
     i, j = (n - 2) % 3, (n - 1) % 3

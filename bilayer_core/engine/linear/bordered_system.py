@@ -16,7 +16,9 @@ from bilayer_core.model.records.step import Configuration
 
 @piece(int, Problem, Configuration)
 def assemble_bodies(p, at):
-    """U and D of free bodies: links of contact, and what they hold. Whether U is not zero is left in `coupled`."""
+    """Assemble U and D of free bodies: links of contact, and what they hold. Whether U is not zero is left in
+    `coupled`.
+    """
     border, coupled, attachments, strands, sums = p.border, p.bordered.coupled, p.attachments, p.strands, p.sums
     border.border[:] = 0.0
     copy(sums.body_hessian, border.corner)
@@ -58,7 +60,7 @@ def _add_links(surfaces, strands, sums, border):
 
 @piece(int, Problem, float)
 def restrict_bodies(p, shift):
-    """D and U restricted to what bodies may do, shifted by multiples of their masses."""
+    """Return D and U restricted to what bodies may do, shifted by multiples of their masses."""
     freedom, inertia, constrained, dimension = p.bodies.freedom, p.bodies.inertia, p.constrained, p.strands.dimension
     schur, corner, rows, columns = p.bordered.schur, p.border.corner, p.border.border, p.bordered.border
     m, n = freedom.shape

@@ -153,7 +153,7 @@ def _list_rails(columns, rails, rate, strands, contacts, c, e, side):
 
 @kernel
 def _entry(columns, c, a, b):
-    """Entry of the second derivative of contact c by its unknowns a and b."""
+    """Return the entry of the second derivative of contact c by its unknowns a and b."""
     rate, pressed = columns.rate, columns.pressed
     value = rate[c, 0, a] * pressed[c, 0, b] + rate[c, 1, a] * pressed[c, 1, b] + rate[c, 2, a] * pressed[c, 2, b]
     return value - columns.stiffness[c] * columns.foot[c, a] * columns.foot[c, b]

@@ -133,7 +133,7 @@ def factorise(p, at, stage, counts):
 
 @piece(int, Problem)
 def solve(p):
-    """Minus the inverse of the factorised matrix times the present gradient, to `step` and `body_step`."""
+    """Return minus the inverse of the factorised matrix times the present gradient, to `step` and `body_step`."""
     size, system, right = p.strands.size, p.system, p.system.right
     if p.space.exists:
         for j in range(p.sums.gradient.shape[0]):

@@ -202,7 +202,7 @@ def check_types(typing_context, name: str, wanted: tuple, given: tuple) -> None:
 
 
 def pointer_to(context, signature) -> ir.PointerType:
-    """LLVM's type of the address of a function."""
+    """Return LLVM's type of the address of a function."""
     kinds = [context.get_value_type(of) for of in signature.args]
     return ir.FunctionType(context.get_value_type(signature.return_type), kinds).as_pointer()
 

@@ -31,7 +31,7 @@ class Backlog(Generic[Item]):
         self._urgent = self._closed = False
 
     def __len__(self) -> int:
-        """Items that wait."""
+        """Return the items that wait."""
         return len(self._items)
 
     def put(self, item: Item, patience: float | None = None) -> bool:
@@ -63,7 +63,7 @@ class Backlog(Generic[Item]):
             self._append(item)
 
     def take(self, timeout: float | None) -> list[Item]:
-        """All items there are, once there is one and more have gathered; none after a time [s] without any."""
+        """Return all items there are, once there is one and more have gathered; none after a time [s] without any."""
         with self._changed:
             if not self._changed.wait_for(lambda: self._items, timeout):
                 return []

@@ -75,7 +75,7 @@ class GrowingLog:
         return True
 
     def read(self) -> list[Message]:
-        """Topic, time [ns] and data of each message that was added, those of about 8 MB at most."""
+        """Return the topic, time [ns] and data of each message that was added, those of about 8 MB at most."""
         found: list[Message] = []
         size = 0
         with open_log(self.path) as file:

@@ -109,7 +109,7 @@ class LogFile:
         return found
 
     def messages(self, topics: set[str] | None = None, begin: int = 0) -> Iterator[tuple[str, int, bytes]]:
-        """Topic, time [ns] and data of each message of some topics (default all), in the order of the file.
+        """Return the topic, time [ns] and data of each message of some topics (default all), in the order of the file.
 
         Chunks that have none of them, or whose messages are all before `begin` [ns], are not unpacked.
         """

@@ -58,7 +58,7 @@ def is_log(path: Path) -> bool:
 
 
 def read_head(path: Path) -> Head:
-    """Scene, description, versions and settings: all that comes before the first chunk.
+    """Return the scene, description, versions and settings: all that comes before the first chunk.
 
     Raises
     ------

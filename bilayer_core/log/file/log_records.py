@@ -245,7 +245,7 @@ def records_of(inside: bytes) -> Iterator[tuple[int, int, int]]:
 
 
 def read_index(data: bytes) -> tuple[int, np.ndarray]:
-    """Channel, and times of its messages in a chunk [ns], from the content of a message index."""
+    """Return the channel, and times of its messages in a chunk [ns], from the content of a message index."""
     try:
         channel, length = _INDEX_HEAD.unpack_from(data)
         entries = np.frombuffer(data, "<u8", length // 16 * 2, _INDEX_HEAD.size)
@@ -296,7 +296,7 @@ _PER_ENTRY = 200
 
 
 def summary_start(file: BinaryIO) -> int:
-    """Where the summary of a finished file begins [bytes]; 0 if it has none."""
+    """Return where the summary of a finished file begins [bytes]; 0 if it has none."""
     size = file.seek(0, 2)
     place = size - len(MAGIC) - _FOOTER.size
     if place < HEAD.size:

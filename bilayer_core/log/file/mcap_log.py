@@ -433,7 +433,7 @@ class _LogFile:
         self._log.add_metadata(CHAIN, self._chain.link.as_metadata())
 
     def time_to_flush(self) -> float | None:
-        """Wall time until `flush` is due [s], None if there is nothing to flush."""
+        """Return the wall time until `flush` is due [s], None if there is nothing to flush."""
         if self._unflushed_since is None:
             return None
         return max(0.0, self._unflushed_since + FLUSH_PERIOD - clock.monotonic())

@@ -215,7 +215,7 @@ class _Repair:
         return place.length != 6 + int.from_bytes(self._file.read(4), "little")
 
     def _resume(self, last: int, damage: int) -> int:
-        """Where to go on after what is no record: at the next chunk that is whole, or at the end of the file.
+        """Return where to go on after what is no record: at the next chunk that is whole, or at the end of the file.
 
         It is looked for from the last record on, as the length of that may be what is damaged.
         """

@@ -95,7 +95,7 @@ class Template:
         self._buffer += bytes(size)
 
     def views(self) -> dict[str, np.ndarray]:
-        """Writable arrays into the message, one for each field. Nothing can be appended afterwards."""
+        """Return the writable arrays into the message, one for each field. Nothing can be appended afterwards."""
         self._end()
         return {name: decode(self._buffer, field) for name, field in self.fields.items()}
 
@@ -107,7 +107,7 @@ class Template:
         return np.frombuffer(self._buffer, dtype, count, len(HEADER))
 
     def place(self, name: str) -> int:
-        """Where an array that changes begins among the numbers of its type."""
+        """Return where an array that changes begins among the numbers of its type."""
         offset, dtype, _ = self.fields[name]
         return (offset - len(HEADER)) // dtype.itemsize
 
@@ -169,8 +169,8 @@ def decoded(path: str | Path, topic: str, time: int, data: bytes, decode: Callab
 
 
 def read_float64_multi_array(data: bytes) -> tuple[list[str], np.ndarray]:
-    """Names and values of a ``std_msgs/Float64MultiArray``: names stand in the label of its one dimension, or, as older
-    logs have them, each in one of its own.
+    """Return the names and values of a ``std_msgs/Float64MultiArray``: names stand in the label of its one dimension,
+    or, as older logs have them, each in one of its own.
     """
     position = len(HEADER)
 

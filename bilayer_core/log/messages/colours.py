@@ -31,7 +31,7 @@ _TO_LAB = np.array(
 
 
 def _build_map(anchors: tuple[str, ...]) -> np.ndarray:
-    """Colours as sRGBA from 0 to 1, shape (STEPS, 4), float32."""
+    """Return the colours as sRGBA from 0 to 1, shape (STEPS, 4), float32."""
     encoded = np.array([[int(text[i : i + 2], 16) / 255 for i in (1, 3, 5)] for text in anchors])
     linear = np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
     lab = np.cbrt(linear @ _TO_CONE.T) @ _TO_LAB.T
@@ -47,11 +47,15 @@ PRESSURE_MAP = _build_map(PRESSURE_ANCHORS)
 
 
 def map_colours(values: np.ndarray, low: float, high: float, colours: np.ndarray) -> np.ndarray:
-    """Colours of `values` from a map whose ends are those of `low` and `high`: sRGBA from 0 to 1, shape + (4,)."""
+    """Return the colours of `values` from a map whose ends are those of `low` and `high`: sRGBA from 0 to 1, shape +
+    (4,).
+    """
     index = np.rint((values - low) * ((STEPS - 1) / (high - low)))
     return colours.take(np.minimum(np.maximum(index, 0.0), STEPS - 1.0).astype(np.intp), axis=0)
 
 
 def strain_colours(strain: np.ndarray, limit: float) -> np.ndarray:
-    """Colours of `strain`, full blue at -`limit` and full red at +`limit`: sRGBA from 0 to 1, float32, shape + (4,)."""
+    """Return the colours of `strain`, full blue at -`limit` and full red at +`limit`: sRGBA from 0 to 1, float32, shape
+    + (4,).
+    """
     return map_colours(strain, -limit, limit, STRAIN_MAP)

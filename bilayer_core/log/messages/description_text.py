@@ -90,7 +90,7 @@ def _described(values: Mapping[str, Any], scene_text: str) -> Description:
 
 
 def to_json(description: Description) -> str:
-    """All of it as one JSON object, the scene's text included."""
+    """Return all of it as one JSON object, the scene's text included."""
     values = {name: json.loads(text) for name, text in to_text(description).items()}
     return json.dumps({**values, "scene_text": description.scene_text}, ensure_ascii=False)
 

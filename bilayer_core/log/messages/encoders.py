@@ -32,22 +32,22 @@ def state_template(description: Description) -> Template:
 
 
 def clock_template() -> Template:
-    """``rosgraph_msgs/Clock``."""
+    """Return ``rosgraph_msgs/Clock``."""
     template = Template()
     template.stamp()
     return template
 
 
 def float64_template() -> Template:
-    """``std_msgs/Float64``: field ``data``."""
+    """Return ``std_msgs/Float64``: field ``data``."""
     template = Template()
     template.array("data", "<f8", (1,))
     return template
 
 
 def multi_array_template(names: Iterable[str], size: int | None = None) -> Template:
-    """``std_msgs/Float64MultiArray``: one dimension of so many values, by default one for each name; its label has the
-    names, with commas between.
+    """Return ``std_msgs/Float64MultiArray``: one dimension of so many values, by default one for each name; its label
+    has the names, with commas between.
     """
     names = list(names)
     size = len(names) if size is None else size
@@ -72,7 +72,7 @@ def stamped_template(numbers: int) -> Template:
 
 
 def pose_array_template(count: int) -> Template:
-    """``geometry_msgs/PoseArray``: field ``poses``, rows x y z and quaternion x y z w."""
+    """Return ``geometry_msgs/PoseArray``: field ``poses``, rows x y z and quaternion x y z w."""
     template = Template()
     template.header(FRAME_ID)
     template.put("<u4", count)
@@ -81,7 +81,7 @@ def pose_array_template(count: int) -> Template:
 
 
 def point_cloud_template(count: int, fields: tuple[str, ...] = POINT_FIELDS) -> Template:
-    """``sensor_msgs/PointCloud2``: field ``points``, rows of float32 with these names."""
+    """Return ``sensor_msgs/PointCloud2``: field ``points``, rows of float32 with these names."""
     step = 4 * len(fields)
     template = Template()
     template.header(FRAME_ID)

@@ -15,7 +15,7 @@ def node_order(description: Description) -> np.ndarray:
 
 
 def layer_rows(description: Description) -> list[slice]:
-    """Where the nodes of each of the description's `layers` stand in this order."""
+    """Return where the nodes of each of the description's `layers` stand in this order."""
     rows, count = [], 0
     for strand in description.strands:
         for layer in strand.layers or (strand,):

@@ -195,7 +195,7 @@ float32 v
 
 
 def _dependencies(name: str) -> list[str]:
-    """Types that `name` needs, itself first, each once, in the order in which they are met."""
+    """Return the types that `name` needs, itself first, each once, in the order in which they are met."""
     found: list[str] = []
     for field_type in (line.split()[0].removesuffix("[]") for line in _DEFINITIONS[name].splitlines()):
         if field_type in _DEFINITIONS:
@@ -204,6 +204,6 @@ def _dependencies(name: str) -> list[str]:
 
 
 def schema_text(ros_type: str) -> str:
-    """Definition of ``package/msg/Type`` followed by those of all types that it needs."""
+    """Return the definition of ``package/msg/Type`` followed by those of all types that it needs."""
     first, *others = _dependencies(ros_type.replace("/msg/", "/"))
     return _DEFINITIONS[first] + "".join(f"{_SEPARATOR}MSG: {name}\n{_DEFINITIONS[name]}" for name in others)

@@ -84,7 +84,7 @@ def read_prefix(description: Description, message: bytes) -> str:
 
 
 def _rows_of_ends(description: Description) -> dict[str, tuple[int, int]]:
-    """First and last node of the first strand of each open rod, as rows of `NodeFrames`."""
+    """Return the first and last node of the first strand of each open rod, as rows of `NodeFrames`."""
     found: dict[str, tuple[int, int]] = {}
     count = 0
     for strand in description.strands:

@@ -52,7 +52,7 @@ class TopicSpec:
     depth: int = 10
 
     def full_name(self, namespace: str = LOG_NAMESPACE) -> str:
-        """Absolute name under `namespace`."""
+        """Return the absolute name under `namespace`."""
         return self.name if self.name.startswith("/") else f"{namespace}/{self.name}"
 
     @property
@@ -85,7 +85,7 @@ itself. They come with every frame: who looks one up by the stamp of a pose, a w
 
 
 def output_topics(description: Description, tf: bool = False) -> tuple[TopicSpec, ...]:
-    """All topics that a run of this model sends, with `TF` if that is asked for.
+    """Return all topics that a run of this model sends, with `TF` if that is asked for.
 
     ================================ ==================================================================================
     ``/clock``                       simulation time

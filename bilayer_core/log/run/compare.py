@@ -148,11 +148,11 @@ class _Rows:
         self._end = 0
 
     def blocks(self) -> Iterator[tuple[slice, dict[str, Array]]]:
-        """All rows, as they are read."""
+        """Return all rows, as they are read."""
         return self._blocks
 
     def window(self, begin: int, end: int) -> dict[str, Array]:
-        """Rows from `begin` to `end`, neither of which ever decreases."""
+        """Return the rows from `begin` to `end`, neither of which ever decreases."""
         while self._end < end:
             rows, block = next(self._blocks)
             for name, values in block.items():
@@ -206,7 +206,7 @@ class _Largest:
 
 
 def _compared(one: _Rows, other: _Rows, begin: float, end: float) -> dict[str, QuantityDifference]:
-    """Differences of quantities that come at one rate, over a span of time [s]."""
+    """Return the differences of quantities that come at one rate, over a span of time [s]."""
     found = {entry.name: _Largest(entry) for entry in one.entries}
     if not found:
         return {}
@@ -233,7 +233,7 @@ def _compared(one: _Rows, other: _Rows, begin: float, end: float) -> dict[str, Q
 
 
 def _interpolated(of: _Rows, times: Array) -> dict[str, Array]:
-    """Values at other times, linear between rows; before the first and after the last, those."""
+    """Return the values at other times, linear between rows; before the first and after the last, those."""
     last = len(of.times) - 1
     left = np.clip(np.searchsorted(of.times, times, side="right") - 1, 0, max(0, last - 1))
     right = np.minimum(left + 1, last)
@@ -253,7 +253,7 @@ def _interpolated(of: _Rows, times: Array) -> dict[str, Array]:
 
 
 def _turned_to(one: Array, other: Array) -> Array:
-    """Quaternions with the sign that is nearer to others: q and −q are one rotation."""
+    """Return the quaternions with the sign that is nearer to others: q and −q are one rotation."""
     if one.shape != other.shape:
         return other
     return np.where(np.sum(one * other, axis=-1, keepdims=True) < 0.0, -other, other)

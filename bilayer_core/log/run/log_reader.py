@@ -202,12 +202,12 @@ def read_description(path: str | Path) -> Description:
 
 
 def scene_from_log(path: str | Path) -> str:
-    """YAML text of the scene that was run, overrides included."""
+    """Return YAML text of the scene that was run, overrides included."""
     return read_description(path).scene_text
 
 
 def read_state(path: str | Path, time: float | None = None) -> tuple[np.ndarray, float]:
-    """Flat state and its time [s]: the last one logged, or the last one at or before `time`.
+    """Return the flat state and its time [s]: the last one logged, or the last one at or before `time`.
 
     An InputError if there is none, or if `time` is later than the last one by more than states are apart.
     """
@@ -274,7 +274,7 @@ def read_messages(path: str | Path, topics: set[str] | None = None) -> Iterator[
 
 
 def _read_metadata(path: Path) -> dict[str, dict[str, str]]:
-    """Metadata records by name that stand after the messages."""
+    """Return the metadata records by name that stand after the messages."""
     with open_log(path) as file:
         records = (read_metadata(content(file, place), LATE) for place in walk(file) if place.opcode == METADATA)
         return {name: values for name, values in records if name in LATE}

@@ -56,7 +56,7 @@ class _Topic:
         return self.dtype.itemsize * int(np.prod(self.shape))
 
     def stack(self, messages: list[bytes]) -> Array:
-        """Arrays of messages, shape (messages, ...)."""
+        """Return the arrays of messages, shape (messages, ...)."""
         whole = np.frombuffer(b"".join(messages), np.uint8).reshape(len(messages), self.size)
         part = np.ascontiguousarray(whole[:, self.offset : self.offset + self.row_size])
         found = part.view(self.dtype).reshape(len(messages), *self.shape)
@@ -148,7 +148,7 @@ class LogSource:
         return times, topics
 
     def why_not(self, name: str) -> str | None:
-        """Why a quantity that other logs have is not in this one; None if no log has it."""
+        """Return why a quantity that other logs have is not in this one; None if no log has it."""
         held = self.description
         for entry in entries(held, (), ()):
             if entry.name == name and name not in self.entries:
@@ -232,7 +232,7 @@ class LogSource:
         return f"{self._file.namespace}/{name}"
 
     def _values(self, wanted: list[Entry]) -> dict[str, Array]:
-        """Values of quantities that come at one rate, by name."""
+        """Return the values of quantities that come at one rate, by name."""
         found: dict[str, Array] = {}
         if not wanted:
             return found
@@ -251,7 +251,7 @@ class LogSource:
         return found
 
     def _shapes(self) -> dict[str, object]:
-        """Shapes of rods, of all nodes."""
+        """Return the shapes of rods, of all nodes."""
         count, nodes = len(self.times[SHAPE_TIME]), self.description.node_count
         self._take_memory(4 * count * nodes * (len(encoders.POINT_FIELDS) + 7))
         whole = {
@@ -272,7 +272,7 @@ class LogSource:
         }
 
     def _layout(self, name: str, stamps: Array) -> _Topic:
-        """Where the array is in the messages of a topic."""
+        """Return where the array is in the messages of a topic."""
         if name in ("stimulus_applied", "energy", "solver"):
             channels = (len(self.description.channels),)
             if not len(stamps):
@@ -288,7 +288,7 @@ class LogSource:
         return _Topic(name, len(template), offset, dtype, shape, stamps)
 
     def _first(self, name: str) -> tuple[tuple[str, ...], Array, int]:
-        """Labels and values of a topic's first message, and its size [bytes]."""
+        """Return the labels and values of a topic's first message, and its size [bytes]."""
         topic = self._full(name)
         for _, time, data in self._file.messages({topic}):
             labels, values = decoded(self.path, topic, time, data, read_float64_multi_array)

@@ -45,11 +45,11 @@ class LoggedRun(RunData):
         return self._source.entries
 
     def why_not(self, name: str) -> str | None:
-        """Why a quantity that other logs have is not in this one; None if it is, or if no log has it."""
+        """Return why a quantity that other logs have is not in this one; None if it is, or if no log has it."""
         return self._source.why_not(name)
 
     def blocks(self, wanted: Sequence[Entry]) -> Iterator[tuple[slice, dict[str, np.ndarray]]]:
-        """Values of quantities that come at one rate, in blocks of rows, by name, as they are read."""
+        """Return the values of quantities that come at one rate, in blocks of rows, by name, as they are read."""
         return self._source.blocks(wanted)
 
 

@@ -38,7 +38,8 @@ def write_state(path: str | Path, state: np.ndarray, description: Description, f
 
 
 def read_saved_state(path: str | Path, description: Description, time: float | None = None) -> np.ndarray:
-    """Flat state from a file of `write_state`, or from an MCAP log the last one, or the last at or before a time [s].
+    """Return the flat state from a file of `write_state`, or from an MCAP log the last one, or the last at or before a
+    time [s].
 
     Raises
     ------
@@ -60,7 +61,7 @@ def read_saved_state(path: str | Path, description: Description, time: float | N
 
 
 def _read(path: Path, size: int) -> tuple[tuple, np.ndarray]:
-    """Layout and values of a file, which holds at most as many values as there should be, and some."""
+    """Return the layout and values of a file, which holds at most as many values as there should be, and some."""
     try:
         if path.stat().st_size > 8 * size + LARGEST_FILE:
             raise InputError(f"{path}: has {path.stat().st_size / 1e6:.3g} MB, more than a state of this scene takes")

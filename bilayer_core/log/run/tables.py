@@ -112,7 +112,7 @@ class Table:
 
 
 def one_table(entries: list[Entry], path: str) -> Table:
-    """All quantities as one table.
+    """Return all quantities as one table.
 
     Raises
     ------

@@ -38,7 +38,7 @@ class Messages:
         return sum(name == topic for name, _, _ in self._taken)
 
     def messages(self, topics: set[str] | None = None, begin: int = 0) -> Iterator[tuple[str, int, bytes]]:
-        """Topic, time [ns] and data of each message of some topics, from a time on."""
+        """Return the topic, time [ns] and data of each message of some topics, from a time on."""
         return (of for of in self._taken if (topics is None or of[0] in topics) and of[1] >= begin)
 
 

@@ -29,7 +29,7 @@ class Motion:
 
 
 def slots_of_owner(present: Present, owner: str, guides: bool) -> dict[bool, int]:
-    """Slots of the mechanisms of a joint or of a guided body, by whether they slide."""
+    """Return the slots of the mechanisms of a joint or of a guided body, by whether they slide."""
     return {
         mechanism.slides: index
         for index, mechanism in enumerate(present.model.mechanisms)

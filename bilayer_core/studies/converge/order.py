@@ -43,7 +43,7 @@ class Estimate:
 
 
 def observed_order(sizes: tuple[float, float, float], values: tuple[float, float, float]) -> float | None:
-    """p from runs at three sizes, coarse to fine; None if their values do not fall on a power law."""
+    """Return p from runs at three sizes, coarse to fine; None if their values do not fall on a power law."""
     (h1, h2, h3), (f1, f2, f3) = sizes, values
     first, second = f1 - f2, f2 - f3
     noise = ROUNDING * max(abs(f2), abs(f3))

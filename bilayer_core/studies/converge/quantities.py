@@ -90,7 +90,9 @@ def measure(simulator: Simulator, duration: float) -> dict[str, float]:
 
 
 def headline(found: dict[str, float], prescribed: Sequence[str]) -> list[str]:
-    """Names of the quantities that say what a robot did: no tips, no prescribed motion, no negligible displacement."""
+    """Return the names of the quantities that say what a robot did: no tips, no prescribed motion, no negligible
+    displacement.
+    """
     chosen = [
         name
         for name in found

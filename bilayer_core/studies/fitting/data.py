@@ -321,7 +321,7 @@ def _column(
 
 
 def _factor(source: str, heading: str, written: str | None, unit: str) -> float:
-    """SI units in the unit of a heading."""
+    """Return SI units in the unit of a heading."""
     if written is None:
         return 1.0
     if written.strip() == unit:

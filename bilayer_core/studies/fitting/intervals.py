@@ -55,7 +55,7 @@ class Spread:
 
 
 def spread_of(matrix: Array, residuals: Array, known: bool, numerical_noise: float) -> Spread:
-    """How well the parameters of a Jacobian of full rank are known.
+    """Return how well the parameters of a Jacobian of full rank are known.
 
     Parameters
     ----------

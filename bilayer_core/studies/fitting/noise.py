@@ -111,7 +111,7 @@ def choose_steps(runs: Runs, start: Array, weights: Array) -> list[Step]:
 
 
 def _row(start: Array, k: int, spacing: float, places: Sequence[int]) -> list[Array]:
-    """Points in a row along a parameter, about the start as far as bounds allow."""
+    """Return the points in a row along a parameter, about the start as far as bounds allow."""
     middle = float(np.clip(start[k], max(places) * spacing, 1.0 - max(places) * spacing))
     points = []
     for place in places:
@@ -151,7 +151,7 @@ def _with_third(runs: Runs, start: Array, k: int, found: _Roughness, weights: Ar
 
 
 def _weighted(values: Array, weights: Array) -> Array:
-    """Values that are compared with data, weighted, shape (points, residuals)."""
+    """Return the values that are compared with data, weighted, shape (points, residuals)."""
     present = weights > 0.0
     found: Array = values[:, present] * weights[present]
     return found

@@ -25,7 +25,7 @@ def check_outputs(directory: Path, force: bool) -> None:
 
 
 def report_of(result: FitResult) -> dict[str, Any]:
-    """All figures of a fit for JSON, in SI units; what is not known is None."""
+    """Return all figures of a fit for JSON, in SI units; what is not known is None."""
     names = list(result.values)
     return {
         "scene": result.scene.name,

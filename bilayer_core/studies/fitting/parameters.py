@@ -132,7 +132,7 @@ class Parameter:
 
 
 def told(parameters: Sequence[Parameter], parts: Array) -> str:
-    """Values of parameters in a row, for messages."""
+    """Return the values of parameters in a row, for messages."""
     return ", ".join(f"{p.path} = {p.shown(p.value(u))}" for p, u in zip(parameters, parts.tolist(), strict=True))
 
 
@@ -143,7 +143,7 @@ def content_of(scene: SceneConfig) -> dict[str, Any]:
 
 
 def read_parameters(scene: SceneConfig, asked: Parameters) -> list[Parameter]:
-    """Parameters of a scene as users give them.
+    """Return the parameters of a scene as users give them.
 
     Raises
     ------

@@ -19,7 +19,7 @@ Values = dict[str, Any]
 
 
 def count_of(spec: SweepSpec) -> int:
-    """How many runs a sweep has.
+    """Return how many runs a sweep has.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def at(parameter: Parameter, u: float) -> Any:
 
 
 def _sample(spec: SweepSpec, dimension: int) -> np.ndarray:
-    """Points of the unit cube, shape (samples, dimension)."""
+    """Return the points of the unit cube, shape (samples, dimension)."""
     from scipy.stats import qmc
 
     if spec.design == "latin_hypercube":

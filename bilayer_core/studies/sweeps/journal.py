@@ -112,7 +112,7 @@ class Journal:
             )
 
     def keys(self) -> set[str]:
-        """Keys of the runs whose rows are here."""
+        """Return the keys of the runs whose rows are here."""
         return {key for (key,) in self._base.execute("SELECT key FROM rows")}
 
     def add(self, rows: Iterable[Row]) -> None:

@@ -47,12 +47,12 @@ class FinishedRun:
 
 
 def quantities_of(metrics: dict[str, Metric]) -> tuple[str, ...]:
-    """Names of the quantities that metrics look at, without components."""
+    """Return the names of the quantities that metrics look at, without components."""
     return tuple(dict.fromkeys(metric.quantity for metric in metrics.values() if isinstance(metric, OfQuantity)))
 
 
 def name_and_component(quantity: str, known: Any) -> tuple[str, str]:
-    """``com.z`` as ``com`` and ``z``."""
+    """Return ``com.z`` as ``com`` and ``z``."""
     if quantity in known:
         return quantity, ""
     name, dot, component = quantity.rpartition(".")
@@ -60,7 +60,7 @@ def name_and_component(quantity: str, known: Any) -> tuple[str, str]:
 
 
 def measure(job: Job, run: FinishedRun) -> dict[str, Any]:
-    """All metrics of a run that is done.
+    """Return all metrics of a run that is done.
 
     Raises
     ------

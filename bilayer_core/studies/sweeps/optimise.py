@@ -158,7 +158,9 @@ def _is_value(value: Any) -> TypeGuard[float]:
 
 
 def start_of(sweep: Sweep) -> Values | None:
-    """Values of `start`, of parameters that all have one; of a list of values the first one stands in for it."""
+    """Return the values of `start`, of parameters that all have one; of a list of values the first one stands in for
+    it.
+    """
     found: Values = {}
     for name, parameter in sweep.spec.parameters.items():
         if parameter.start is not None:

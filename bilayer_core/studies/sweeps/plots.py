@@ -151,7 +151,8 @@ def _map(figure: Any, result: SweepResult, names: list[str], metric: str) -> Non
 
 
 def cell_borders(levels: Column, logarithmic: bool) -> Column:
-    """Borders half way between values, by their ratios if the axis is logarithmic; the outer cells are symmetric.
+    """Return the borders half way between values, by their ratios if the axis is logarithmic; the outer cells are
+    symmetric.
 
     Parameters
     ----------

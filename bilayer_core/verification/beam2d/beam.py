@@ -68,7 +68,7 @@ class PlanarBeam:
         return self.energy_law.strains(self.position).bend / self.energy_law.weight
 
     def energy(self) -> float:
-        """Elastic energy, up to a constant that the eigenstrain sets, and that of gravity [J]."""
+        """Return the elastic energy, up to a constant that the eigenstrain sets, and that of gravity [J]."""
         return self._potential(self.position, self.position, math.inf)
 
     def solve_static(self) -> None:
@@ -108,7 +108,7 @@ class PlanarBeam:
         return elastic - float(np.sum(self._weight * position)) + float(inertia + lost)
 
     def _minimum(self, predicted: Array, length: float) -> Array:
-        """Where the potential of a step is least [m], shape (n_node, 2)."""
+        """Return where the potential of a step is least [m], shape (n_node, 2)."""
         masses = np.repeat(self._mass, 2) / length**2
         friction = np.repeat(self._mass, 2) * self.damping / length
         at = predicted.copy()
@@ -138,7 +138,7 @@ class PlanarBeam:
         )
 
     def _newton_step(self, gradient: Array, band: Array) -> Array:
-        """Minus the inverse Hessian, made positive definite, times the gradient; zero where the clamp holds."""
+        """Return minus the inverse Hessian, made positive definite, times the gradient; zero where the clamp holds."""
         gradient[self._held] = 0.0
         for unknown in self._held:
             band[:, unknown] = 0.0

@@ -87,7 +87,7 @@ class BeamEnergy:
         self._inner = slice(int(wall is not None), None)
 
     def strains(self, position: Array) -> Strains:
-        """Strains of nodes at `position` [m], shape (n_node, 2)."""
+        """Return the strains of nodes at `position` [m], shape (n_node, 2)."""
         edge = np.diff(position, axis=0)
         length = np.linalg.norm(edge, axis=1)
         tangent = edge / length[:, None]
@@ -104,11 +104,11 @@ class BeamEnergy:
         return before, tangent[self._after]
 
     def mean_strain(self, axial: Array) -> Array:
-        """ε̄ of bending elements, shape (n_bend,)."""
+        """Return ε̄ of bending elements, shape (n_bend,)."""
         return 0.5 * (axial[self._before] + axial[self._after])
 
     def _forces(self, at: Strains, force: Array, moment: Array) -> tuple[Array, Array]:
-        """∂E/∂ε of edges and ∂E/∂(χ Δl) of bending elements; N and M from eigenstrain, shapes (n_edge,)."""
+        """Return ∂E/∂ε of edges and ∂E/∂(χ Δl) of bending elements; N and M from eigenstrain, shapes (n_edge,)."""
         s = self.section
         chi = at.bend / self.weight
         axial = (s.axial * at.axial - force) * self.edge_length
@@ -121,7 +121,7 @@ class BeamEnergy:
         return 0.5 * (of_edges[self._before] + of_edges[self._after])
 
     def value(self, position: Array, force: Array, moment: Array) -> float:
-        """E [J].
+        """Return E [J].
 
         Parameters
         ----------
@@ -137,7 +137,9 @@ class BeamEnergy:
         return float(stretching + bending.sum() + coupling.sum())
 
     def derivatives(self, position: Array, force: Array, moment: Array) -> tuple[Array, Array]:
-        """∂E/∂x, shape (2 n_node,), and ∂²E/∂x² as a lower band, ``band[r, j] = H[j + r, j]``, shape (6, 2 n_node)."""
+        """Return ∂E/∂x, shape (2 n_node,), and ∂²E/∂x² as a lower band, ``band[r, j] = H[j + r, j]``, shape (6, 2
+        n_node).
+        """
         s, at = self.section, self.strains(position)
         axial, bending = self._forces(at, force, moment)
         axial_slope = at.tangent / self.edge_length  # ∂ε/∂e

@@ -53,7 +53,7 @@ class Peer:
         return machine.installed_version(self.name) if find_spec(self.module) else None
 
     def plan(self, quick: bool) -> list[Case]:
-        """All runs, with its own clamp and shifted by half an element."""
+        """Return all runs, with its own clamp and shifted by half an element."""
         return [
             Case(elements, dt, shifted)
             for shifted in (False, True)
@@ -95,7 +95,7 @@ def measure(results: Results, quick: bool, progress: Callable[[str], None] = lam
 
 
 def count(quick: bool) -> int:
-    """How many times `measure` calls its progress."""
+    """Return how many times `measure` calls its progress."""
     return len(PEERS)
 
 

@@ -78,7 +78,9 @@ def shapes(scene: SceneConfig) -> Iterator[tuple[str, int]]:
 
 
 def families(scene: SceneConfig, integrators: Iterable[str] = tuple(INTEGRATORS)) -> list[Family]:
-    """All families that a scene accepts; with contact or a fluid without the integrator that is not made for it."""
+    """Return all families that a scene accepts; with contact or a fluid without the integrator that is not made
+    for it.
+    """
     free = scene.contact is None and scene.fluid is None
     fit = [name for name in integrators if free or name != FREE_MOTION]
     return [
@@ -90,7 +92,7 @@ def families(scene: SceneConfig, integrators: Iterable[str] = tuple(INTEGRATORS)
 
 
 def refusal(scene: SceneConfig, family: Family) -> str | None:
-    """Why a scene cannot be simulated by this family; None if it can."""
+    """Return why a scene cannot be simulated by this family; None if it can."""
     try:
         make_plan(scene, model=family.model, dimension=family.dimension, integrator=family.integrator)
     except SceneError as error:

@@ -105,7 +105,7 @@ def fingerprint(problem: Problem) -> str:
 
 
 def read_file() -> dict:
-    """All entries, by problem and model."""
+    """Return all entries, by problem and model."""
     return json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
 
 

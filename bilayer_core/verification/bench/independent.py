@@ -74,7 +74,7 @@ class SplineRod:
         self.start[:, 0] = [knots[i + 1 : i + DEGREE + 1].mean() for i in range(self.count)]  # Greville: x(s) = s
 
     def potential_force(self, c: Array, time: float) -> Array:
-        """−∂E/∂c of coefficients c [m], shape (count, 2), [N]."""
+        """Return −∂E/∂c of coefficients c [m], shape (count, 2), [N]."""
         a, b = self._first @ c, self._second @ c
         square = np.einsum("ij,ij->i", a, a)
         size = np.sqrt(square)
@@ -87,7 +87,7 @@ class SplineRod:
         return self._weight_force - self._first.T @ of_first - self._second.T @ of_second
 
     def rate(self, time: float, y: Array) -> Array:
-        """ẏ of y = (c, ċ), flat."""
+        """Return ẏ of y = (c, ċ), flat."""
         c, v = y.reshape(2, self.count, 2)
         force = self.potential_force(c, time)
         acceleration = np.zeros_like(c)
@@ -97,7 +97,9 @@ class SplineRod:
         return np.concatenate([v.ravel(), acceleration.ravel()])
 
     def integrate(self, times: Array, corner: float | None = None, tolerance: float = 1e-6) -> tuple[Array, Array]:
-        """Ways of tip and mass centre [m], shapes (n_time, 2), at times [s] from 0; `corner` is one of the drive's."""
+        """Return the ways of tip and mass centre [m], shapes (n_time, 2), at times [s] from 0; `corner` is one of the
+        drive's.
+        """
         y = np.concatenate([self.start.ravel(), np.zeros(2 * self.count)])
         ends = [times[0], *([corner] if corner else []), times[-1]]
         found = []

@@ -16,7 +16,7 @@ CPU_FILE = Path("/proc/cpuinfo")
 
 
 def record() -> dict[str, object]:
-    """Machine and versions; a library that is not installed is None."""
+    """Return the machine and versions; a library that is not installed is None."""
     return {
         "cpu": cpu_model(),
         "cores": usable_cores(),
@@ -48,7 +48,7 @@ def cpu_model() -> str:
 
 
 def installed_version(name: str) -> str | None:
-    """Version of a distribution, None if it is not installed."""
+    """Return the version of a distribution, None if it is not installed."""
     try:
         return version(name)
     except PackageNotFoundError:

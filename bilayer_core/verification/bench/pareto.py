@@ -40,7 +40,9 @@ def cheapest(runs: Iterable[dict], error: float) -> dict | None:
 
 
 def costs(runs: Sequence[dict], error: float = AIM) -> dict[str, dict[Family, float]]:
-    """CPU time [s] of the cheapest run of each family that reaches an error, by problem; infinite where none does."""
+    """Return CPU time [s] of the cheapest run of each family that reaches an error, by problem; infinite where none
+    does.
+    """
     found: dict[str, dict[Family, float]] = {}
     for run in runs:
         by_family = found.setdefault(run["problem"], {})
@@ -51,7 +53,7 @@ def costs(runs: Sequence[dict], error: float = AIM) -> dict[str, dict[Family, fl
 
 
 def scores(by_problem: Mapping[str, Mapping[Family, float]]) -> dict[Family, float]:
-    """Geometric mean over problems of a family's cost relative to the cheapest family's, the least first.
+    """Return the geometric mean over problems of a family's cost relative to the cheapest family's, the least first.
 
     What does not reach the aim counts `PENALTY` times the dearest that does. Problems that no family brings to the aim
     do not count. A family must have run every problem that some family reached, in some dimension: the lean ones that

@@ -81,7 +81,7 @@ def work_precision_figure(problem: Problem, runs: list[dict], chosen: Family | N
 
 
 def _keys(families: Iterable[Family]) -> list:
-    """Entries of a legend: a colour for each integrator, a mark for each model and dimension."""
+    """Return the entries of a legend: a colour for each integrator, a mark for each model and dimension."""
     from matplotlib.lines import Line2D
 
     families = list(dict.fromkeys(families))

@@ -88,7 +88,7 @@ class Problem:
 
 
 def halved(stations: int, dt: float, count: int) -> tuple[tuple[int, float], ...]:
-    """Levels of a reference: edges doubled and steps halved `count` - 1 times."""
+    """Return the levels of a reference: edges doubled and steps halved `count` - 1 times."""
     return tuple(((stations - 1) * 2**k + 1, dt / 2**k) for k in range(count))
 
 

@@ -15,7 +15,7 @@ PEERS, SCALING, START = "peers", "scaling", "start"
 
 
 def names() -> list[str]:
-    """All that ``--only`` takes."""
+    """Return all that ``--only`` takes."""
     return [*(problem.name for problem in PROBLEMS), PEERS, SCALING, START]
 
 
@@ -43,7 +43,7 @@ def chosen_problems(chosen: Sequence[str]) -> list[Problem]:
 
 
 def count(chosen: Sequence[str], quick: bool) -> int:
-    """How many times `measure` calls its progress."""
+    """Return how many times `measure` calls its progress."""
     total = len(work_precision.plan(chosen_problems(chosen), quick))
     total += cantilever.count(quick) * (PEERS in chosen)
     total += len(scaling.plan(quick)) * (SCALING in chosen)
@@ -75,7 +75,7 @@ def measure(chosen: Sequence[str], results: Results, quick: bool, progress: Call
 
 
 def write(results: Results, directory: Path) -> list[Path]:
-    """Conclusions into the json file, tables and pictures beside it."""
+    """Write the conclusions into the json file, tables and pictures beside it."""
     content = results.content
     family = tables.recommendation(content)
     content["recommended"] = vars(family) if family else None

@@ -53,7 +53,7 @@ def _run(model: str, dimension: int, nodes: int) -> dict:
 
 
 def slopes(records: list[dict], least: int = 0) -> dict[tuple[str, int], float]:
-    """Slope of log(CPU time of a step) against log(nodes) by least squares, for every model and dimension.
+    """Return the slope of log(CPU time of a step) against log(nodes) by least squares, for every model and dimension.
 
     Parameters
     ----------

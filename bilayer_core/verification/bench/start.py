@@ -34,7 +34,7 @@ print(json.dumps({"cpu_time": cpu, "import_time": imported - begin, "compile_tim
 
 
 def plan(quick: bool) -> list[tuple[str, str, int]]:
-    """Scene, model and dimension of all starts; of a quick benchmark the first and the last."""
+    """Return the scene, model and dimension of all starts; of a quick benchmark the first and the last."""
     if quick:
         found = [(QUICK_SCENE, *shape) for shape in shapes(load_scene(QUICK_SCENE))]
         return [found[0], found[-1]]
@@ -64,7 +64,7 @@ def _starts(scene: str, model: str, dimension: int) -> dict:
 
 
 def surroundings(**more: str) -> dict[str, str]:
-    """Environment of a process that finds this package as this one did."""
+    """Return the environment of a process that finds this package as this one did."""
     source = str(Path(__file__).resolve().parents[2])
     paths = os.pathsep.join(filter(None, (source, os.environ.get("PYTHONPATH"))))
     return {**os.environ, "PYTHONPATH": paths, **more}

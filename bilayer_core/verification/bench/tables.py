@@ -31,14 +31,14 @@ def write_csv(content: dict, directory: Path) -> list[Path]:
 
 
 def write_page(content: dict, directory: Path) -> Path:
-    """DIR/bench.md."""
+    """Write DIR/bench.md; returns its path."""
     path = directory / "bench.md"
     _write(path, lambda file: file.write(page(content)))
     return path
 
 
 def page(content: dict) -> str:
-    """All tables in Markdown, those for the README among them."""
+    """Return all tables in Markdown, those for the README among them."""
     parts = [
         _where(content),
         *(["Quick: reduced problems, few points.", ""] if content["quick"] else []),
@@ -72,7 +72,7 @@ def _where(content: dict) -> str:
 
 
 def cantilever_table(content: dict) -> list[str]:
-    """CPU seconds of the cheapest run of each tool that reaches an error."""
+    """Return CPU seconds of the cheapest run of each tool that reaches an error."""
     head = [f"≤ {error:.0e}".replace("e-0", "e-") for error in cantilever.ERRORS]
     rows = [[label, *_cheapest_at(runs)] for label, runs in cantilever_series(content).items()]
     return _table(["tool", *head], rows)
@@ -102,7 +102,7 @@ def _cheapest_at(runs: list[dict]) -> list[str]:
 
 
 def costs_table(content: dict) -> list[str]:
-    """CPU seconds of each family at one per cent, by problem, the best family first."""
+    """Return CPU seconds of each family at one per cent, by problem, the best family first."""
     by_problem = pareto.costs(comparable(content))
     names = [problem.name for problem in PROBLEMS if problem.name in by_problem]
     best = {name: min(costs.values()) for name, costs in by_problem.items()}
@@ -118,8 +118,8 @@ def costs_table(content: dict) -> list[str]:
 
 
 def beside_table(content: dict) -> list[str]:
-    """CPU seconds to an error of 1 %, or to that of a blurred reference: the longest fixed steps of implicit Euler, and
-    adaptive ones of the default, with the model and the dimension of `auto`.
+    """Return CPU seconds to an error of 1 %, or to that of a blurred reference: the longest fixed steps of implicit
+    Euler, and adaptive ones of the default, with the model and the dimension of `auto`.
     """
     rows, bars = [], read_file()
     for problem in PROBLEMS:
@@ -168,7 +168,7 @@ def references_table(content: dict) -> list[str]:
 
 
 def scaling_table(content: dict) -> list[str]:
-    """Milliseconds a step by nodes, and the slopes."""
+    """Return the milliseconds a step by nodes, and the slopes."""
     records = content[scaling.PART]
     nodes = sorted({record["nodes"] for record in records})
     steep = scaling.slopes(records, scaling.MANY)
@@ -182,7 +182,7 @@ def scaling_table(content: dict) -> list[str]:
 
 
 def start_table(content: dict) -> list[str]:
-    """Seconds from nothing to the first step."""
+    """Return the seconds from nothing to the first step."""
     rows = [
         [
             record["scene"],

@@ -133,7 +133,9 @@ Measure = Trajectory | Headline
 
 
 def rms_distance(found: Array, reference: Array) -> float:
-    """Root mean square over `found`'s times of the distance between ways [m]; columns: time [s], coordinates [m]."""
+    """Return the root mean square over `found`'s times of the distance between ways [m]; columns: time [s], coordinates
+    [m].
+    """
     times = found[:, 0]
     way = CubicSpline(reference[:, 0], reference[:, 1:])(times)
     squares = np.sum((found[:, 1:] - way) ** 2, axis=1)
@@ -141,7 +143,7 @@ def rms_distance(found: Array, reference: Array) -> float:
 
 
 def rise(track: Track) -> float:
-    """How far the mass centre rose above its start at most [m]."""
+    """Return how far the mass centre rose above its start at most [m]."""
     return peak(np.array(track.times), np.array(track.points["com"])[:, 2])[0]
 
 

@@ -13,7 +13,7 @@ PART = "work_precision"
 
 
 def plan(problems: Iterable[Problem], quick: bool) -> list[tuple[Problem, Configuration]]:
-    """All runs, problem by problem."""
+    """Return all runs, problem by problem."""
     return [
         (problem, configuration)
         for problem in problems

@@ -27,7 +27,7 @@ def digest(cases: dict[str, StressCase]) -> str:
 
 
 def commit() -> str | None:
-    """Commit of the checkout that the package is run from; None without one."""
+    """Return the commit of the checkout that the package is run from; None without one."""
     here = Path(__file__).resolve().parent
     found = subprocess.run(["git", "-C", str(here), "rev-parse", "--short", "HEAD"], capture_output=True, text=True)
     return found.stdout.strip() or None

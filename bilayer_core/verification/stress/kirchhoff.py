@@ -23,7 +23,7 @@ LOAD_STEPS = 6
 
 
 def stiffness(scene: SceneConfig) -> Array:
-    """GJ, and EI about the normal and across it [N m²] of the first rod, of one layer, shape (3,)."""
+    """Return GJ, and EI about the normal and across it [N m²] of the first rod, of one layer, shape (3,)."""
     rod = scene.rods[0]
     layer, width = rod.layers[0], rod.width
     material = scene.materials[layer.material]
@@ -35,7 +35,7 @@ def stiffness(scene: SceneConfig) -> Array:
 
 
 def loaded_tip(force: Array, k: Array, free: Array, length: float, start: Array, place: float) -> tuple[Array, Array]:
-    """Where the tip goes [m], shape (3,), and the frame (t, m1, m2) at a place along the rod, as columns.
+    """Return where the tip goes [m], shape (3,), and the frame (t, m1, m2) at a place along the rod, as columns.
 
     Parameters
     ----------
@@ -79,8 +79,8 @@ def loaded_tip(force: Array, k: Array, free: Array, length: float, start: Array,
 
 
 def cantilever(scene: SceneConfig) -> tuple[Array, Array]:
-    """Where the tip of a scene goes that has one rod, straight or an arc, from the origin, and one load at its end [m];
-    and the frame in the middle of the last edge.
+    """Return where the tip of a scene goes that has one rod, straight or an arc, from the origin, and one load at its
+    end [m]; and the frame in the middle of the last edge.
     """
     rod, load = scene.rods[0], scene.loads[0]
     path = rod.path

@@ -101,7 +101,7 @@ def balanced(trial: Trial, parts: int = 10) -> None:
 
 
 def torture_scenes() -> dict[str, Path]:
-    """File of the scene of each torture case by its name, in alphabetical order."""
+    """Return the file of the scene of each torture case by its name, in alphabetical order."""
     return {path.stem: path for path in sorted(bundled_directory("torture").glob("*.yaml"))}
 
 

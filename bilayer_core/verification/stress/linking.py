@@ -54,7 +54,7 @@ def twist(points: Array, directors: Array) -> float:
 
 
 def _carried(vectors: Array, before: Array, after: Array) -> Array:
-    """Vectors turned by the smallest rotation from one tangent to the next."""
+    """Return the vectors turned by the smallest rotation from one tangent to the next."""
     axis = np.cross(before, after)
     along = (axis * vectors).sum(1, keepdims=True) * axis / (1.0 + (before * after).sum(1, keepdims=True))
     return (before * after).sum(1, keepdims=True) * vectors + np.cross(axis, vectors) + along

@@ -41,7 +41,7 @@ class MatrixCase:
 
 
 def matrix() -> list[MatrixCase]:
-    """All cases, in a fixed order."""
+    """Return all cases, in a fixed order."""
     return [*_axes(), *_choices(), *_sample(), *_long()]
 
 
@@ -124,7 +124,7 @@ def _near_default(axis: str, part: float) -> float:
 
 
 def _part_of(axis: str, value: float) -> float:
-    """Where a value lies on an axis, 0 … 1, by bisection."""
+    """Return where a value lies on an axis, 0 … 1, by bisection."""
     low, high = 0.0, 1.0
     for _ in range(40):
         middle = 0.5 * (low + high)

@@ -68,7 +68,7 @@ def _outcomes_by_axis(records: Sequence[Record], axes: Sequence[str], path: Path
 
 
 def _cells(records: Sequence[Record]) -> dict[tuple[str, str], tuple[Outcome, bool]]:
-    """Worst outcome of each value and robot of an axis, and whether it is inside the region."""
+    """Return the worst outcome of each value and robot of an axis, and whether it is inside the region."""
     cells: dict[tuple[str, str], tuple[Outcome, bool]] = {}
     for record in records:
         _, value, robot, *_ = record.name.split("/")
@@ -78,7 +78,7 @@ def _cells(records: Sequence[Record]) -> dict[tuple[str, str], tuple[Outcome, bo
 
 
 def _effort(records: Sequence[Record], path: Path) -> Path:
-    """Histograms of iterations and of rejected attempts a step, and of errors inside the region."""
+    """Return the histograms of iterations and of rejected attempts a step, and of errors inside the region."""
     figure, panels = figure_of(1, 3, (13.0, 3.8))
     run = [record for record in records if record.figures.get("substeps")]
     iterations = [record.figures["iterations"] / record.figures["substeps"] for record in run]

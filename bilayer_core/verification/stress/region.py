@@ -34,7 +34,7 @@ SMALLEST_THRESHOLD = 1e-6
 
 
 def outside(p: Parameters) -> list[str]:
-    """Why a case is outside the region; empty if it is inside."""
+    """Return why a case is outside the region; empty if it is inside."""
     return [*_of_material(p), *_of_contact(p), *_of_time(p)]
 
 
@@ -66,7 +66,9 @@ def _of_material(p: Parameters) -> Iterator[str]:
 
 
 def free_bend(p: Parameters) -> float:
-    """Curvature times thickness of a strip without loads: natural, and what the eigenstrain adds by Timoshenko."""
+    """Return the curvature times thickness of a strip without loads: natural, and what the eigenstrain adds by
+    Timoshenko.
+    """
     (e1, e2), (h1, h2) = robots.moduli(p), robots.layer_thicknesses(p)
     a1, a2 = e1 * h1, e2 * h2
     moment = a1 * a2 / (a1 + a2) * 0.5 * robots.thickness(p) * abs(p.eigenstrain)

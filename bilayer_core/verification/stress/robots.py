@@ -50,7 +50,7 @@ def thickness(p: Parameters) -> float:
 
 
 def width(p: Parameters) -> float:
-    """[m]"""
+    """Return the width of a robot [m]."""
     return max(0.1 * p.length, thickness(p)) if p.slenderness < 10.0 else 0.1 * p.length
 
 
@@ -66,7 +66,7 @@ def moduli(p: Parameters) -> tuple[float, float]:
 
 
 def bending_stiffness(p: Parameters) -> float:
-    """D of the bonded section per width [N m]."""
+    """Return D of the bonded section per width [N m]."""
     (e1, e2), (h1, h2) = moduli(p), layer_thicknesses(p)
     a1, a2 = e1 * h1, e2 * h2
     return (e1 * h1**3 + e2 * h2**3) / 12.0 + a1 * a2 / (a1 + a2) * (0.5 * thickness(p)) ** 2
@@ -90,12 +90,12 @@ def duration(p: Parameters) -> float:
 
 
 def gravity(p: Parameters) -> float:
-    """[m/s²]"""
+    """Return the size of gravity [m/s²]."""
     return p.gravity * USUAL_LENGTH / p.length
 
 
 def speed(p: Parameters) -> float:
-    """[m/s]: of the same Froude number at any length."""
+    """Return a speed [m/s], of the same Froude number at any length."""
     return p.speed
 
 
@@ -107,12 +107,12 @@ def height(p: Parameters) -> float:
 
 
 def barrier(p: Parameters) -> float:
-    """[m]"""
+    """Return the barrier distance [m]."""
     return p.barrier * p.length / USUAL_LENGTH
 
 
 def strip_mass(p: Parameters) -> float:
-    """[kg]"""
+    """Return the mass of a strip [kg]."""
     lower, upper = layer_thicknesses(p)
     return DENSITY * width(p) * p.length * (lower + p.covered * upper)
 
@@ -223,7 +223,7 @@ def _below(p: Parameters) -> float:
 
 
 def _clear(p: Parameters) -> float:
-    """Height of a strip whose face is three barrier distances over the ground [m]."""
+    """Return the height of a strip whose face is three barrier distances over the ground [m]."""
     return _below(p) + 3.0 * barrier(p)
 
 

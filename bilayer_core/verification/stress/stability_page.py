@@ -49,7 +49,7 @@ def worst(records: Sequence[Record], count: int) -> list[Record]:
 
 
 def counts(records: Sequence[Record]) -> dict[str, Counter]:
-    """Outcomes inside and outside the region."""
+    """Return the outcomes inside and outside the region."""
     found = {"inside": Counter(), "outside": Counter()}
     for record in records:
         found["inside" if record.inside else "outside"][record.outcome] += 1
@@ -57,7 +57,7 @@ def counts(records: Sequence[Record]) -> dict[str, Counter]:
 
 
 def remedies(records: Sequence[Record]) -> tuple[int, int]:
-    """How many refusals there were, and how many of their remedies worked."""
+    """Return how many refusals there were, and how many of their remedies worked."""
     refused = [record for record in records if record.outcome is Outcome.REFUSED]
     return len(refused), sum(bool(record.remedy_works) for record in refused)
 

@@ -44,5 +44,5 @@ NOT_EXPRESSIBLE: tuple[tuple[int, str, str], ...] = (
 
 
 def torture_cases() -> list[StressCase]:
-    """All of them, on their ladders."""
+    """Return all of them, on their ladders."""
     return [case for torture in TORTURES for case in torture.cases()]

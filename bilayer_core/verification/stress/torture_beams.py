@@ -16,7 +16,7 @@ Array = np.ndarray
 
 
 def closes(trial: Trial, statically: bool = False) -> Decision:
-    """Distance of the tip from the clamp over the length.
+    """Return the distance of the tip from the clamp over the length.
 
     The energy of a bend θ between two edges is EI/(2 l) (2 tan(θ/2))², so a moment M bends it by the part (M l/EI)²/3
     less than M l/EI.
@@ -37,7 +37,7 @@ CLOSED = 5e-3
 
 
 def as_kirchhoff(trial: Trial, statically: bool = False) -> Decision:
-    """Error of the tip's displacement, or of its turn, whichever is larger."""
+    """Return the error of the tip's displacement, or of its turn, whichever is larger."""
     balanced(trial) if statically else trial.run()
     frame, start = trial.simulator.frame(), trial.simulator.model.start_position
     before, along = start[-1] - start[-2], frame.positions[-1] - frame.positions[-2]

@@ -14,7 +14,7 @@ Array = np.ndarray
 
 
 def holds(trial: Trial) -> Decision:
-    """Ratio of the two tensions of a strip that slides over a drum, while the hand is fastest."""
+    """Return the ratio of the two tensions of a strip that slides over a drum, while the hand is fastest."""
     simulator, friction = trial.simulator, trial.simulator.scene.contact.friction
     pull = abs(simulator.scene.loads[0].force[2])
     trial.run(CAPSTAN_FROM)
@@ -31,7 +31,7 @@ CAPSTAN = 0.03
 
 
 def slides(trial: Trial) -> Decision:
-    """Acceleration of a block down a slope, or how fast it creeps over the threshold of friction."""
+    """Return the acceleration of a block down a slope, or how fast it creeps over the threshold of friction."""
     simulator, scene = trial.simulator, trial.simulator.scene
     friction, (along, _, down) = scene.contact.friction, scene.gravity
     coefficient, steep = friction.coefficient, along / -down
@@ -78,7 +78,9 @@ FALLEN = 0.1
 
 
 def stays_on_table(trial: Trial) -> Decision:
-    """Speed that the box has got, over what friction can give it: from the strip, and back from the table."""
+    """Return the speed that the box has got, over what friction can give it: from the strip, and back from the
+    table.
+    """
     simulator, scene = trial.simulator, trial.simulator.scene
     largest, lowest, begin = 0.0, math.inf, scene.bodies[0].motion.times[0]
     half = 0.5 * scene.bodies[1].surface.size[2]

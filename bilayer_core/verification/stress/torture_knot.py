@@ -41,7 +41,7 @@ def loop_radius(points: Array) -> float:
 
 
 def pulls(trial: Trial) -> Decision:
-    """Tension of a knot that is being tied, over that of a thin thread."""
+    """Return the tension of a knot that is being tied, over that of a thin thread."""
     simulator, scene = trial.simulator, trial.simulator.scene
     trial.run(PULLED * scene.duration)
     left, right = (float(simulator.clamps[f"thread.{end}"].wrench[0]) for end in ("start", "end"))

@@ -17,7 +17,7 @@ Array = np.ndarray
 
 
 def snaps(trial: Trial) -> Decision:
-    """How lop-sided an arch gets on its way through, over its rise."""
+    """Return how lop-sided an arch gets on its way through, over its rise."""
     simulator = trial.simulator
     start = simulator.positions[:, 2].copy()
     rise, largest, through = float(start.max()), 0.0, False
@@ -42,7 +42,7 @@ LOPSIDED, SYMMETRIC = 0.2, 0.02
 
 
 def snaps_late(trial: Trial) -> Decision:
-    """Delay of a snap beyond the largest load that has an equilibrium, against that of the arch's one mode.
+    """Return the delay of a snap beyond the largest load that has an equilibrium, against that of the arch's one mode.
 
     With the shape y sin k x, k = π/L, of a rise a without stress, under the load q sin k x downwards,
 
@@ -93,7 +93,7 @@ def _ramps(seconds: float) -> tuple[str, ...]:
 
 
 def keeps_momenta(trial: Trial) -> Decision:
-    """Momentum and angular momentum of a beam in free flight."""
+    """Return the momentum and angular momentum of a beam in free flight."""
     simulator, scene = trial.simulator, trial.simulator.scene
     end = scene.loads[0].schedule.times[-1]
     trial.run(end)
@@ -136,7 +136,9 @@ def _moment(trial: Trial) -> Array:
 
 
 def grows(trial: Trial) -> Decision:
-    """Rate at which the middle of a driven column swings more and more, by the halves of the time after the tap."""
+    """Return the rate at which the middle of a driven column swings more and more, by the halves of the time after the
+    tap.
+    """
     simulator, scene = trial.simulator, trial.simulator.scene
     length = scene.rods[0].path.length
     line = scene.materials["film"].density * scene.rods[0].width * scene.rods[0].layers[0].thickness

@@ -28,13 +28,13 @@ X = np.array([1.0, 0.0, 0.0])
 
 
 def torque(trial: Trial) -> float:
-    """C τ of the natural twist of a rod that cannot untwist [N m]."""
+    """Return C τ of the natural twist of a rod that cannot untwist [N m]."""
     scene = trial.simulator.scene
     return float(stiffness(scene)[0] * scene.rods[0].layers[0].natural_twist)
 
 
 def leaves_plane(trial: Trial) -> Decision:
-    """How far a twisted ring gets out of its plane, over its radius."""
+    """Return how far a twisted ring gets out of its plane, over its radius."""
     scene = trial.simulator.scene
     radius, largest = scene.rods[0].path.radius, 0.0
 
@@ -57,7 +57,7 @@ def _on_its_side(what: str, deflection: float, part: float) -> Decision:
 
 
 def critical_torque(tension: float) -> float:
-    """M L/B at which a clamped rod under T L²/B buckles: the smallest root of its characteristic determinant.
+    """Return M L/B at which a clamped rod under T L²/B buckles: the smallest root of its characteristic determinant.
 
     Deflections are a + b s + c exp(i k₁ s) + d exp(i k₂ s), k = ½ (M ± √(M² − 4 T)); at s = ±½ they and their slopes
     are zero. Without tension k₂ = 0 would be a double root, so a little is put in.
@@ -79,7 +79,7 @@ def critical_torque(tension: float) -> float:
 
 
 def leaves_line(trial: Trial) -> Decision:
-    """How far a twisted rod gets from its line, over its length."""
+    """Return how far a twisted rod gets from its line, over its length."""
     simulator, scene = trial.simulator, trial.simulator.scene
     length, largest = scene.rods[0].path.length, 0.0
 
@@ -105,7 +105,7 @@ def turned(trial: Trial) -> float:
 
 
 def link(trial: Trial) -> tuple[float, float]:
-    """Twist + writhe of the rod at present, and its writhe alone [turns].
+    """Return the twist + writhe of the rod at present, and its writhe alone [turns].
 
     The directors of edges are those of their middles; at both ends the bodies that hold them say where they are.
     """
@@ -118,7 +118,7 @@ def link(trial: Trial) -> tuple[float, float]:
 
 
 def keeps_link(trial: Trial) -> Decision:
-    """Twist + writhe at the end against the turns of the end."""
+    """Return the twist + writhe at the end against the turns of the end."""
     trial.run()
     found, bent = link(trial)
     kept = Decision.near("turns of twist and writhe together", found, turned(trial), LINK)
@@ -139,7 +139,7 @@ def ply(tension: float, bending: float, radius: float) -> tuple[float, float]:
 
 
 def winds_up(trial: Trial) -> Decision:
-    """Torque in a plectoneme, whose radius is half the distance of the strands where they touch."""
+    """Return the torque in a plectoneme, whose radius is half the distance of the strands where they touch."""
     trial.run()
     simulator, scene = trial.simulator, trial.simulator.scene
     kept = Decision.near("turns of twist and writhe together", link(trial)[0], turned(trial), LINK)

@@ -40,7 +40,7 @@ def beam(stations: int, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0), *
 
 @cache
 def elastica_tip() -> tuple[float, float]:
-    """Tip (x, z) of the heavy cantilever [m], exact."""
+    """Return the tip (x, z) of the heavy cantilever [m], exact."""
     return tuple(heavy_cantilever(WEIGHT, BENDING, AXIAL, LENGTH))
 
 
@@ -53,7 +53,7 @@ def cantilever_tip(edges: int, dimension: int = 3) -> tuple[float, float]:
 
 
 def cantilever_error(edges: int) -> float:
-    """Distance of the tip from where it should be, over the length."""
+    """Return the distance of the tip from where it should be, over the length."""
     return math.dist(cantilever_tip(edges), elastica_tip()) / LENGTH
 
 
@@ -64,7 +64,7 @@ def order_in_space() -> tuple[float, float]:
 
 
 def _critical(answer: float, description: Callable[[float], dict], dimension: int) -> tuple[float, float]:
-    """Multiple of `answer` at which a straight column becomes unstable, by bisection, and 1."""
+    """Return the multiple of `answer` at which a straight column becomes unstable, by bisection, and 1."""
     low, high = BRACKET
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
@@ -76,7 +76,9 @@ def _critical(answer: float, description: Callable[[float], dict], dimension: in
 def imperfect_column(
     part: float, direction: str = "normal", dimension: int | str = "auto", model: str = "laminate"
 ) -> tuple[float, float]:
-    """Distance of a column's tip from its axis at a part of Euler's load, over its imperfection, and 1/(1 − part)."""
+    """Return the distance of a column's tip from its axis at a part of Euler's load, over its imperfection, and 1/(1 −
+    part).
+    """
     size, sides = 1e-4 * LENGTH, (WIDTH, THICKNESS) if direction == "normal" else (THICKNESS, WIDTH)
     load = part * EULER_FREE_END * BENDING / LENGTH**2
     press = {"name": "press", "rod": "rod", "position": LENGTH, "force": [-load, 0, 0]}
@@ -111,7 +113,7 @@ PAIRS = {
 
 
 def bonded_tip(pair: str, edges: int = 80) -> tuple[float, float]:
-    """Sinking of the tip of a bonded pair under a weight that hardly bends it, and F L³/3EI [mm]."""
+    """Return the sinking of the tip of a bonded pair under a weight that hardly bends it, and F L³/3EI [mm]."""
     moduli, thickness = PAIRS[pair]
     stiffness = bonded_bending_stiffness(moduli, thickness, WIDTH)
     expected = 1e-3 * LENGTH
@@ -130,7 +132,8 @@ def bonded_tip(pair: str, edges: int = 80) -> tuple[float, float]:
 
 
 def vibration(edges: int = 40, periods: int = 4, steps: int = 300, dimension: int = 3) -> tuple[float, float]:
-    """Frequency of a cantilever that is let go, from crossings of its slowest mode's amplitude, and ω/2π [Hz].
+    """Return the frequency of a cantilever that is let go, from crossings of its slowest mode's amplitude, and ω/2π
+    [Hz].
 
     Integrated by `sdirk2` with `steps` a period; the pull at the tip ends with the first step.
     """
@@ -158,7 +161,7 @@ def vibration(edges: int = 40, periods: int = 4, steps: int = 300, dimension: in
 
 
 def cantilever_mode(s: np.ndarray) -> np.ndarray:
-    """Slowest mode of a cantilever at s = x/L, 1 at its end."""
+    """Return the slowest mode of a cantilever at s = x/L, 1 at its end."""
     k = FIRST_MODE
     ratio = (math.cosh(k) + math.cos(k)) / (math.sinh(k) + math.sin(k))
     return 0.5 * (np.cosh(k * s) - np.cos(k * s) - ratio * (np.sinh(k * s) - np.sin(k * s)))

@@ -41,7 +41,7 @@ def strip(m: float, n: float, eigenstrain: float, stations: int = STATIONS) -> d
 
 @cache
 def two_rod(m: float, n: float, eigenstrain: float) -> float:
-    """κH/η from two bonded rods."""
+    """Return κH/η from two bonded rods."""
     simulator = Simulator(load_scene(strip(m, n, eigenstrain)))
     simulator.solve_static()
     return -simulator.curvatures[STATIONS // 2] * THICKNESS / eigenstrain
@@ -49,7 +49,7 @@ def two_rod(m: float, n: float, eigenstrain: float) -> float:
 
 @cache
 def beam2d(m: float, n: float, eigenstrain: float) -> float:
-    """κH/η from the planar beam."""
+    """Return κH/η from the planar beam."""
     config = load_scene(strip(m, n, eigenstrain))
     beam = beam_of(config)
     set_stimuli(beam, config, {"heat": 1.0})

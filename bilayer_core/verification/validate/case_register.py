@@ -70,7 +70,8 @@ CASES = tuple(case for family in FAMILIES for case in family.CASES)
 
 
 def select(pattern: str | None = None, quick: bool = False) -> list[Case]:
-    """Cases whose name contains `pattern`, or matches it where it has wildcards; without the long ones on request.
+    """Return the cases whose name contains `pattern`, or matches it where it has wildcards; without the long ones on
+    request.
 
     Raises
     ------

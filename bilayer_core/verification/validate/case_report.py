@@ -16,7 +16,7 @@ NOTHING = 1e-8
 
 
 def as_json(results: Sequence[Result]) -> str:
-    """``{"cases": [{case, computed, reference, error, limit, pass, …}, …]}``."""
+    """Return ``{"cases": [{case, computed, reference, error, limit, pass, …}, …]}``."""
     return json.dumps({"cases": [result.record() for result in results]}, indent=2, allow_nan=False)
 
 
@@ -71,14 +71,14 @@ def _row(result: Result) -> str:
 
 
 def shown(value: float) -> str:
-    """Five digits; what is smaller than `NOTHING` is rounding, and another on each machine."""
+    """Return five digits; what is smaller than `NOTHING` is rounding, and another on each machine."""
     if not math.isfinite(value):
         return "–"
     return f"{value:.5g}" if value == 0.0 or abs(value) >= NOTHING else f"< {NOTHING:g}"
 
 
 def shown_error(error: float) -> str:
-    """Next power of ten above an error, `NOTHING` at least."""
+    """Return the next power of ten above an error, `NOTHING` at least."""
     if not math.isfinite(error):
         return "–"
     return f"1e{math.ceil(math.log10(max(error, NOTHING))):d}"

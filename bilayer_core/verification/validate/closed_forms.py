@@ -20,7 +20,7 @@ FIRST_MODE = 1.875104
 
 
 def timoshenko(m: float, n: float) -> float:
-    """κH/η of a bilayer whose top layer grows, m = E₂/E₁, n = h₂/h₁ (bottom over top); Timoshenko 1925."""
+    """Return κH/η of a bilayer whose top layer grows, m = E₂/E₁, n = h₂/h₁ (bottom over top); Timoshenko 1925."""
     return 6 * (1 + n) ** 2 / (3 * (1 + n) ** 2 + (1 + m * n) * (n**2 + 1 / (m * n)))
 
 
@@ -30,13 +30,13 @@ def timoshenko_as_printed(m: float, n: float) -> float:
 
 
 def bending_of_layers(moduli: tuple[float, float], thickness: tuple[float, float], width: float) -> float:
-    """Σ EA z² of two layers about their common neutral axis [N m²]; bottom, then top."""
+    """Return Σ EA z² of two layers about their common neutral axis [N m²]; bottom, then top."""
     areas = [e * width * h for e, h in zip(moduli, thickness, strict=True)]
     return areas[0] * areas[1] / (areas[0] + areas[1]) * (0.5 * sum(thickness)) ** 2
 
 
 def bonded_bending_stiffness(moduli: tuple[float, float], thickness: tuple[float, float], width: float) -> float:
-    """EI of a bonded bilayer about its neutral axis [N m²]; bottom, then top."""
+    """Return EI of a bonded bilayer about its neutral axis [N m²]; bottom, then top."""
     own = sum(e * width * h**3 / 12.0 for e, h in zip(moduli, thickness, strict=True))
     return own + bending_of_layers(moduli, thickness, width)
 
@@ -49,13 +49,16 @@ def clamped_twist(torque: float, stiffness: float, warping: float, length: float
 
 @cache
 def strip_torsion(shear_moduli: tuple[float, float], thickness: tuple[float, float], width: float) -> dict[str, float]:
-    """GJ [N m²] of two layers in a bonded strip: `layers`, the sum of their own, and `laminate`, of the section."""
+    """Return GJ [N m²] of two layers in a bonded strip: `layers`, the sum of their own, and `laminate`, of the
+    section.
+    """
     own = sum(_warped_section((g,), (h,), width) for g, h in zip(shear_moduli, thickness, strict=True))
     return {"layers": own, "laminate": _warped_section(shear_moduli, thickness, width)}
 
 
 def _warped_section(shear_moduli: tuple[float, ...], thickness: tuple[float, ...], width: float) -> float:
-    """GJ of layers bonded to each other [N m²], from St-Venant's warping ω = y z + Σ g_n(z) sin k_n y, k_n = (2n+1)π/w.
+    """Return GJ of layers bonded to each other [N m²], from St-Venant's warping ω = y z + Σ g_n(z) sin k_n y, k_n =
+    (2n+1)π/w.
 
     g″ = k² g in each layer; G (g′ + b) with 2 y = Σ b_n sin k_n y is zero at the faces; it and g are continuous between
     layers: a linear system for each n with g = p e^{−k(z − z₀)} + q e^{−k(z₁ − z)} from z₀ to z₁. The sides are free by
@@ -88,7 +91,7 @@ def _warped_section(shear_moduli: tuple[float, ...], thickness: tuple[float, ...
 
 
 def heavy_cantilever(weight: float, bending: float, axial: float, length: float) -> np.ndarray:
-    """Tip (x, z) [m] of a horizontal extensible elastica, clamped at the origin, under its own weight.
+    """Return the tip (x, z) [m] of a horizontal extensible elastica, clamped at the origin, under its own weight.
 
     With s the rest length, θ the slope, ε the strain:  EA ε = −q (L − s) sin θ,
     EI θ'' = q (1 + ε) (L − s) cos θ,  θ(0) = 0,  θ'(L) = 0;  solved by collocation.
@@ -126,7 +129,7 @@ def bonded_helix(
     moduli: tuple[float, float] = (1e8, 1e8),
     thickness: tuple[float, float] = (1e-3, 1e-3),
 ) -> tuple[float, float]:
-    """Radius and pitch [m] of a layer with natural curvature χ̄ and twist τ̄ [1/m] bonded on a straight one.
+    """Return the radius and pitch [m] of a layer with natural curvature χ̄ and twist τ̄ [1/m] bonded on a straight one.
 
     Least energy per length over strain ε, curvature χ and twist τ of the layers' common neutral axis, over which their
     own centrelines stand at z: a = 1 + ε − z χ, b = z τ, ε_l = √(a² + b²) − 1, ψ = atan2(b, a),
@@ -181,8 +184,8 @@ def bonded_helix(
 
 
 def oblique_slide(force: tuple[float, float], coefficients: tuple[float, float], g: float, time: float) -> np.ndarray:
-    """Velocity [m/s] after `time` [s] from rest of a block on a plane that a force per mass [m/s²] drives against
-    friction whose coefficients differ along x and y: v̇_i = f_i − g μ_i² v_i/√(Σ μ² v²).
+    """Return the velocity [m/s] after `time` [s] from rest of a block on a plane that a force per mass [m/s²] drives
+    against friction whose coefficients differ along x and y: v̇_i = f_i − g μ_i² v_i/√(Σ μ² v²).
     """
     squares = np.square(coefficients)
 
@@ -194,8 +197,8 @@ def oblique_slide(force: tuple[float, float], coefficients: tuple[float, float],
 
 
 def end_loaded_cantilever(load: float, follower: bool) -> np.ndarray:
-    """Tip (x, z)/L of an inextensible cantilever along x under a force F L²/EI = `load` at its end: along z, or, as a
-    `follower`, along its normal there.
+    """Return the tip (x, z)/L of an inextensible cantilever along x under a force F L²/EI = `load` at its end: along z,
+    or, as a `follower`, along its normal there.
 
     Seen from the tip, θ'' = −F cos(θ − θ_F) with θ' = 0 there, and θ = 0 at the wall.
     """
@@ -264,7 +267,7 @@ class StickSlip:
 
 
 def stick_slip(p: StickSlip, times: np.ndarray) -> np.ndarray:
-    """Displacements of the mass [m] at some times [s]."""
+    """Return the displacements of the mass [m] at some times [s]."""
 
     def rate(t: float, y: np.ndarray) -> list[float]:
         part = t / p.duration
@@ -281,7 +284,7 @@ def stick_slip(p: StickSlip, times: np.ndarray) -> np.ndarray:
 
 
 def strip_towards_light(angle: float, curvature: float, length: float, strain: float) -> tuple[float, float]:
-    """Tip of a strip clamped along x that bends away from light by κ₀ max(0, n·l) [m].
+    """Return the tip of a strip clamped along x that bends away from light by κ₀ max(0, n·l) [m].
 
     With θ the angle of the tangent and light at `angle` α from the normal, ψ = θ + α has ψ′ = −κ₀ cos ψ, so sin ψ =
     tanh(artanh(sin α) − κ₀ s): it tends to −π/2 and never looks away from the light. Its middle grows by n·l times
@@ -296,6 +299,6 @@ def strip_towards_light(angle: float, curvature: float, length: float, strain: f
 
 
 def lag_behind(seen: Callable[[float], float], lag: float, time: float) -> float:
-    """y at a time [s] where T y′ = u − y follows u, from where it has settled."""
+    """Return y at a time [s] where T y′ = u − y follows u, from where it has settled."""
     found = solve_ivp(lambda t, y: (seen(t) - y) / lag, (0.0, time), [seen(0.0)], rtol=1e-12, atol=1e-14, max_step=1e-3)
     return float(found.y[0, -1])

@@ -23,7 +23,7 @@ SLIPPERY, ROUGH = 0.3, 0.5
 
 
 def tilted_gravity(angle: float) -> list[float]:
-    """Gravity on level ground that acts like a slope down to +x [m/s²]."""
+    """Return the gravity on level ground that acts like a slope down to +x [m/s²]."""
     return [GRAVITY * math.sin(angle), 0.0, -GRAVITY * math.cos(angle)]
 
 
@@ -44,7 +44,7 @@ def acceleration(simulator: Simulator, settle: float = 0.05, time: float = 0.2) 
 
 
 def stacked(model: str, dimension: int) -> tuple[float, float]:
-    """Distance of the middles of two strips of unlike layers, one on the other on the ground [mm]."""
+    """Return the distance of the middles of two strips of unlike layers, one on the other on the ground [mm]."""
     unlike = {"paper": {"youngs_modulus": 2e9, "poisson_ratio": 0.4, "density": 1000.0}}
     layers = [layer("bottom"), layer("top", material="paper")]
     heights = {"low": 1.999e-3, "high": 4.998e-3}
@@ -67,7 +67,9 @@ def stacked(model: str, dimension: int) -> tuple[float, float]:
 
 @cache
 def resting_gap() -> float:
-    """Gap d [m] at which the barrier carries 10 mm × 2 mm of density 1000: K_c [2(d − d̂) log(d/d̂) + (d − d̂)²/d] = q."""
+    """Return the gap d [m] at which the barrier carries 10 mm × 2 mm of density 1000: K_c [2(d − d̂) log(d/d̂) + (d −
+    d̂)²/d] = q.
+    """
     limit, stiffness, weight = 1e-3, 1e7, 1000.0 * GRAVITY * 0.01 * 2e-3
 
     def excess(d: float) -> float:
@@ -77,7 +79,7 @@ def resting_gap() -> float:
 
 
 def compression(edges: int) -> tuple[float, float]:
-    """d̂ − d of the node that is worst off, and as it should be [µm]."""
+    """Return d̂ − d of the node that is worst off, and as it should be [µm]."""
     layers = [layer("bottom"), layer("top")]
     strip = rod(layers, stations=edges + 1, start=(0, 0, 2e-3))
     config = scene([strip], gravity=[0, 0, -GRAVITY], obstacles=[GROUND], contact=contact())
@@ -89,14 +91,14 @@ def compression(edges: int) -> tuple[float, float]:
 
 
 def slide() -> tuple[float, float]:
-    """Acceleration of a block down a steep slope [m/s²]."""
+    """Return the acceleration of a block down a steep slope [m/s²]."""
     simulator = block(tilted_gravity(STEEP), {"coefficient": SLIPPERY, "speed_threshold": 1e-4})
     answer = GRAVITY * (math.sin(STEEP) - SLIPPERY * math.cos(STEEP))
     return acceleration(simulator, settle=0.1)[0], answer
 
 
 def creep() -> tuple[float, float]:
-    """Speed of a block on a gentle slope [µm/s]: where the smoothed law's friction carries it."""
+    """Return the speed of a block on a gentle slope [µm/s]: where the smoothed law's friction carries it."""
     threshold = 1e-3
     simulator = block(tilted_gravity(GENTLE), {"coefficient": ROUGH, "speed_threshold": threshold})
     simulator.run(0.5)
@@ -113,7 +115,7 @@ DIRECTIONS = {
 
 
 def slide_toward(direction: str) -> tuple[float, float]:
-    """Acceleration [m/s²] of a strip with a friction coefficient for each direction."""
+    """Return the acceleration [m/s²] of a strip with a friction coefficient for each direction."""
     gravity, coefficient = DIRECTIONS[direction]
     friction = {"coefficient": 0.5, "speed_threshold": 1e-4, "forward": 0.1, "backward": 0.3, "sideways": 0.2}
     found = acceleration(block(gravity, friction))
@@ -130,7 +132,9 @@ def _oblique() -> tuple[np.ndarray, np.ndarray]:
 
 
 def rebound() -> tuple[float, float]:
-    """Energy of a soft strip that has fallen flat on the ground from 10 m, over that before; the barrier is elastic."""
+    """Return the energy of a soft strip that has fallen flat on the ground from 10 m, over that before; the barrier is
+    elastic.
+    """
     soft = {"gel": {"youngs_modulus": 1e4, "poisson_ratio": 0.5, "density": 1000.0}}
     strip = rod([layer(thickness=2e-3)], length=0.05, start=(0, 0, 10))
     law = {**contact(barrier_distance=1e-4), "stiffness": 1e9}
@@ -146,7 +150,7 @@ WIDTH, THICKNESS = 3e-3, 2e-3
 
 
 def upright(part: float) -> float:
-    """Cosine of the roll of a strip after half a second on a slope that is a part of the steepest."""
+    """Return the cosine of the roll of a strip after half a second on a slope that is a part of the steepest."""
     angle = math.atan(part * (WIDTH - THICKNESS) / THICKNESS)
     strip = rod([layer(thickness=THICKNESS)], length=0.02, stations=5, start=(0, 0, 1.99e-3), width=WIDTH)
     gravity = [0.0, GRAVITY * math.sin(angle), -GRAVITY * math.cos(angle)]
@@ -161,7 +165,7 @@ BALLS = {"solid": (False, 5.0 / 7.0), "hollow": (True, 3.0 / 5.0)}
 
 @cache
 def _rolling(kind: str) -> tuple[float, float, float]:
-    """Acceleration [m/s²], speed [m/s] and ω r [m/s] of a ball on a slope."""
+    """Return the acceleration [m/s²], speed [m/s] and ω r [m/s] of a ball on a slope."""
     angle, radius = 0.3, 0.02
     far_away = rod([layer()], length=0.02, stations=3, start=(0, 5, 5), clamp_start="wall")
     config = scene(
@@ -187,7 +191,7 @@ def rolling_acceleration(kind: str) -> tuple[float, float]:
 
 
 def rolling_slip(kind: str) -> tuple[float, float]:
-    """Speed of its surface [m/s] against that of its centre."""
+    """Return the speed of its surface [m/s] against that of its centre."""
     return _rolling(kind)[2], _rolling(kind)[1]
 
 

@@ -21,7 +21,7 @@ SMALL, LONG_PATCH = 0.005, (0.026, 0.074)
 
 
 def beside_free_end(m: float, n: float, dimension: int) -> tuple[float, float]:
-    """κH/η of the node before the free end, and Timoshenko's."""
+    """Return κH/η of the node before the free end, and Timoshenko's."""
     simulator = Simulator(load_scene(bending.strip(m, n, STRAIN)), dimension=dimension)
     simulator.solve_static()
     return -simulator.curvatures[bending.STATIONS - 2] * bending.THICKNESS / STRAIN, timoshenko(m, n)
@@ -70,7 +70,7 @@ def turned(model: str, stations: int) -> tuple[float, float]:
 
 
 def last_turn(torsion: str, natural: tuple[float, float]) -> tuple[float, float]:
-    """Pitch [m] of a bonded helix through its last four points, and that of least energy."""
+    """Return the pitch [m] of a bonded helix through its last four points, and that of least energy."""
     points = helix.middle_curve(torsion, *natural)
     return helix.screw(points[-4:])[1], bonded_helix(*natural, torsion)[1]
 

@@ -58,7 +58,9 @@ def munk(across: float) -> tuple[float, float]:
 
 
 def turning(layers: list[dict]) -> tuple[float, float]:
-    """Spin [rad/s] of a free strip that turns about its axis, after 0.1 s: ω₀/(1 + ω₀ c t/J) under the moment c ω²."""
+    """Return the spin [rad/s] of a free strip that turns about its axis, after 0.1 s: ω₀/(1 + ω₀ c t/J) under the
+    moment c ω².
+    """
     coefficient, spin, time = 2.0, 50.0, 0.1
     water = {"drag_along": 0.0, "drag_across": 0.0, "drag_turning": coefficient}
     content = scene([rod(layers, LENGTH, EDGES + 1)], fluid=water, solver={"dimension": 3, "dt": 1e-3})
@@ -73,7 +75,9 @@ def turning(layers: list[dict]) -> tuple[float, float]:
 
 
 def sinking_ball() -> tuple[float, float]:
-    """Speed [m/s] of a ball that has fallen through a fluid for 0.2 s: v tanh(g t/v), v its terminal speed."""
+    """Return the speed [m/s] of a ball that has fallen through a fluid for 0.2 s: v tanh(g t/v), v its terminal
+    speed.
+    """
     radius, mass, coefficient, gravity, time = 0.01, 6e-3, 0.47, 9.81, 0.2
     ball = {
         "name": "ball",

@@ -47,7 +47,7 @@ def block(position: tuple[float, float, float], velocity: float = 0.0) -> dict:
 
 
 def resting_gap(law: dict, corner_length: float) -> float:
-    """Gap at which the barrier carries the block's weight on four corners [m]."""
+    """Return the gap at which the barrier carries the block's weight on four corners [m]."""
     limit = law["barrier_distance"]
 
     def excess(d: float) -> float:
@@ -68,7 +68,7 @@ def at_rest(content: dict, height: str = "block") -> Simulator:
 
 
 def under_a_growing_load(solver: dict) -> tuple[float, float]:
-    """Speed [m/s] after a second in which the normal force has grown threefold; solver {} is the default."""
+    """Return the speed [m/s] after a second in which the normal force has grown threefold; solver {} is the default."""
     spectator = rod([layer()], length=0.02, stations=3, start=FAR, clamp_start="wall")
     growing = {"type": "ramp", "start": 0, "end": 1.0, "from": 0, "to": 1}
     content = scene(
@@ -86,7 +86,7 @@ def under_a_growing_load(solver: dict) -> tuple[float, float]:
 
 
 def on_a_belt(solver: dict) -> np.ndarray:
-    """Displacements of the block [m] at `SAMPLES` equal times, shape (SAMPLES,).
+    """Return the displacements of the block [m] at `SAMPLES` equal times, shape (SAMPLES,).
 
     A belt draws it along, a ribbon without mass holds it, and what presses on it comes and goes: it sticks, slips, and
     swings back.
@@ -135,7 +135,7 @@ def _swing() -> np.ndarray:
 
 
 def error_on_a_belt(solver: dict) -> tuple[float, float]:
-    """Largest error of the displacement over the run, as a part of the largest displacement, and 0."""
+    """Return the largest error of the displacement over the run, as a part of the largest displacement, and 0."""
     return float(np.abs(on_a_belt(solver) - _swing()).max() / np.abs(_swing()).max()), 0.0
 
 
@@ -148,7 +148,7 @@ PULL = 0.5
 def pulled_over_grain(
     angle: float, off: float, solver: dict, grain: dict | None = None, time: float = 0.5
 ) -> np.ndarray:
-    """Velocity of a block after `time` [s], turned back by `angle` [m/s], shape (3,).
+    """Return the velocity of a block after `time` [s], turned back by `angle` [m/s], shape (3,).
 
     Ground and pull are turned by `angle` about the normal together: the pull is at `off` [rad] from the grain. `grain`
     says what has the grain, in keys of the ground; by default the ground itself.
@@ -199,7 +199,7 @@ def acceleration_on_grain(off: float) -> np.ndarray:
 
 
 def speed_over_grain(angle: float, off: float, solver: dict) -> tuple[float, float]:
-    """Error of the velocity after half a second [m/s], and 0."""
+    """Return the error of the velocity after half a second [m/s], and 0."""
     error = pulled_over_grain(angle, off, solver)[:2] - 0.5 * acceleration_on_grain(off)
     return float(np.linalg.norm(error)), 0.0
 

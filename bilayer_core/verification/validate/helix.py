@@ -31,7 +31,9 @@ def strip(torsion: str, curvature: float, twist: float, stations: int, length: f
 def equilibrium(
     torsion: str, curvature: float, twist: float, stations: int, length: float, model: str = "two_rod"
 ) -> tuple[Array, Array]:
-    """Points midway between the layers [m], shape (stations, 3), and the bottom layer's m2 there, likewise."""
+    """Return the points midway between the layers [m], shape (stations, 3), and the bottom layer's m2 there,
+    likewise.
+    """
     simulator = Simulator(load_scene(strip(torsion, curvature, twist, stations, length)), model=model)
     simulator.solve_static()
     strands = simulator.positions.reshape(-1, stations, 3)
@@ -42,12 +44,12 @@ def equilibrium(
 
 @cache
 def middle_curve(torsion: str, curvature: float, twist: float, model: str = "two_rod") -> Array:
-    """Points midway between the layers of the strip that is measured [m], shape (STATIONS, 3)."""
+    """Return the points midway between the layers of the strip that is measured [m], shape (STATIONS, 3)."""
     return equilibrium(torsion, curvature, twist, STATIONS, LENGTH, model)[0]
 
 
 def screw(points: Array) -> tuple[float, float]:
-    """Radius and pitch [m] of the helix through equidistant points, shape (4, 3)."""
+    """Return the radius and pitch [m] of the helix through equidistant points, shape (4, 3)."""
     d = np.diff(points, axis=0)
     axis = np.cross(d[1] - d[0], d[2] - d[1])
     axis /= np.linalg.norm(axis)
@@ -58,7 +60,7 @@ def screw(points: Array) -> tuple[float, float]:
 
 
 def measured(torsion: str, curvature: float, twist: float, model: str = "two_rod") -> tuple[float, float]:
-    """Radius and pitch [m] in the middle of the strip."""
+    """Return the radius and pitch [m] in the middle of the strip."""
     center = STATIONS // 2
     return screw(middle_curve(torsion, curvature, twist, model)[center - 8 : center + 9 : 5])
 

@@ -29,7 +29,7 @@ def thrown(stiffness: float, dimension: int, **contact_keys) -> dict:
 
 
 def rebound(dimension: int, integrator: str, tolerance: float, stiffness: float = 1e9, **contact_keys) -> float:
-    """Speed after the impact over that before."""
+    """Return the speed after the impact over that before."""
     content = thrown(stiffness, dimension, **contact_keys)
     simulator = Simulator(load_scene(content), integrator=integrator, tolerance=tolerance)
     simulator.run(1.8e-3)
@@ -39,7 +39,9 @@ def rebound(dimension: int, integrator: str, tolerance: float, stiffness: float 
 
 
 def most_made(integrator: str, dt: float) -> float:
-    """Energy that steps of a length made of nothing in an impact that the barrier cannot resolve, over the largest."""
+    """Return the energy that steps of a length made of nothing in an impact that the barrier cannot resolve, over the
+    largest.
+    """
     simulator = Simulator(load_scene(thrown(1e9, 2)), integrator=integrator, dt=dt)
     most = 0.0
     while simulator.time < 1.2e-3:

@@ -44,7 +44,7 @@ def _is_stable(model: str, dimension: int, first: dict, load: float) -> bool:
 
 
 def critical_load(model: str, dimension: int, first: dict, expected: float) -> tuple[float, float]:
-    """P L²/EI at which a column begins to buckle, found by halving."""
+    """Return P L²/EI at which a column begins to buckle, found by halving."""
     low, high = 0.98 * expected, 1.02 * expected
     for _ in range(9):
         middle = 0.5 * (low + high)
@@ -161,7 +161,7 @@ def _swings(content: dict, model: str, dimension: int) -> float:
 
 
 def double_pendulum(model: str, dimension: int) -> tuple[float, float]:
-    """Period of the slow mode of two equal strips, one hinged to the other [ms]: ω² = 3 (1 − 2/√7) g/L."""
+    """Return the period of the slow mode of two equal strips, one hinged to the other [ms]: ω² = 3 (1 − 2/√7) g/L."""
     first, ratio = math.radians(0.5), 1.4303
     knee = _end_of((0, 0, 0), first)
     strips = [
@@ -178,7 +178,7 @@ def double_pendulum(model: str, dimension: int) -> tuple[float, float]:
 
 
 def four_bar(model: str, dimension: int) -> tuple[float, float]:
-    """Period of a parallelogram of three equal strips on two hinges in the world [ms]: ω² = 6/5 g/L."""
+    """Return the period of a parallelogram of three equal strips on two hinges in the world [ms]: ω² = 6/5 g/L."""
     angle, apart = math.radians(1.0), LENGTH
     left, right = (0.0, 0.0, 0.0), (apart, 0.0, 0.0)
     ends = _end_of(left, angle), _end_of(right, angle)

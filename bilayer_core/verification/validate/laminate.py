@@ -30,7 +30,7 @@ UNIFORM, EDGES = 0.05, 40
 
 
 def every_node(m: float, n: float) -> tuple[float, float]:
-    """κH/η of the node that is farthest off, ends included, and Timoshenko's."""
+    """Return κH/η of the node that is farthest off, ends included, and Timoshenko's."""
     simulator = Simulator(load_scene(bending.strip(m, n, 0.05)), model=MODEL)
     simulator.solve_static()
     found, answer = -simulator.curvatures * bending.THICKNESS / 0.05, timoshenko(m, n)
@@ -52,7 +52,9 @@ def covered_part(edges: int) -> tuple[float, float]:
 
 
 def linear_helix(torsion_kind: str, curvature: float, twist: float) -> tuple[float, float]:
-    """Radius and pitch [m] at small strain: each layer's natural curvature and twist by its share of the stiffness."""
+    """Return the radius and pitch [m] at small strain: each layer's natural curvature and twist by its share of the
+    stiffness.
+    """
     thickness, width, shear = (1e-3, 1e-3), 0.01, torsion.SHEAR_MODULUS
     modulus = GEL["youngs_modulus"]
     own = modulus * width * thickness[1] ** 3 / 12.0
@@ -65,7 +67,9 @@ def linear_helix(torsion_kind: str, curvature: float, twist: float) -> tuple[flo
 
 @cache
 def uniform(coupling: float | None) -> float:
-    """κH/η in the middle of a strip that grows uniformly: of two rods with a multiple of the bond, or the laminate."""
+    """Return κH/η in the middle of a strip that grows uniformly: of two rods with a multiple of the bond, or the
+    laminate.
+    """
     layers = [layer("bottom"), layer("top", eigenstrain={"stimulus": "heat", "gain": UNIFORM})]
     chi = torsion.curvatures(layers, EDGES, *_model(coupling))
     return -float(chi[:, EDGES // 2].mean()) * 2e-3 / UNIFORM
@@ -73,7 +77,7 @@ def uniform(coupling: float | None) -> float:
 
 @cache
 def wave(edges: int, coupling: float | None) -> float:
-    """κH/η where growth is a wave along the strip, likewise."""
+    """Return κH/η where growth is a wave along the strip, likewise."""
     return torsion.wave_curvature(edges, *_model(coupling))[0]
 
 

@@ -53,19 +53,21 @@ def _settled(angle: float, model: str, dimension: int) -> np.ndarray:
 
 
 def tip(angle: float, model: str, dimension: int, axis: int) -> tuple[float, float]:
-    """Coordinate of the tip of a strip that has settled in the light [mm]."""
+    """Return the coordinate of the tip of a strip that has settled in the light [mm]."""
     x, z = strip_towards_light(math.radians(angle), CURVATURE, LENGTH, 0.5 * GAIN)
     found = _settled(math.radians(angle), model, dimension)
     return 1e3 * float(found[axis]), 1e3 * (x if axis == 0 else z)
 
 
 def in_the_dark() -> tuple[float, float]:
-    """Displacement of the tip of a strip lit from behind [mm], and 0."""
+    """Return the displacement of the tip of a strip lit from behind [mm], and 0."""
     return 1e3 * float(np.linalg.norm(_settled(math.radians(160.0), "laminate", 3) - [LENGTH, 0, 0])), 0.0
 
 
 def behind_a_turning_strip(solver: dict) -> tuple[float, float]:
-    """Strain of a layer that its clamp turns out of the light, round in the dark and into it again, over its gain."""
+    """Return the strain of a layer that its clamp turns out of the light, round in the dark and into it again, over its
+    gain.
+    """
     wall = fixed(motion={"type": "prescribed", "times": [0, TIME], "rotations": [[0, 0, 0], [0, TURN, 0]]})
     soft = {"gel": {"youngs_modulus": 1e9, "poisson_ratio": 0.5, "density": 1e-4}}
     content = lit_strip(0.3, SMALL, 11, LAG, bodies=[wall], materials=soft, solver=solver)

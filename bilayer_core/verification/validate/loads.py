@@ -28,7 +28,7 @@ def _settled(layers: list[dict] | None, place: float, **force) -> Simulator:
 
 
 def small_force(layers: list[dict] | None, place: float) -> tuple[float, float]:
-    """Deflection of the tip [µm] under a small force at `place` [m]: F a² (3 L − a)/6EI."""
+    """Return the deflection of the tip [µm] under a small force at `place` [m]: F a² (3 L − a)/6EI."""
     force = SMALL * BENDING / LENGTH**2
     simulator = _settled(layers, place, force=[0, 0, force])
     moved = simulator.positions[-1, 2] - simulator.model.start_position[-1, 2]
@@ -43,12 +43,12 @@ def _large_force(follower: bool) -> tuple[float, float]:
 
 
 def large_force(follower: bool, axis: int) -> tuple[float, float]:
-    """Coordinate of the tip [mm] under a large force, of fixed direction or following the normal."""
+    """Return the coordinate of the tip [mm] under a large force, of fixed direction or following the normal."""
     return 1e3 * _large_force(follower)[axis], 1e3 * LENGTH * end_loaded_cantilever(LARGE, follower)[axis]
 
 
 def tip_weight() -> tuple[float, float]:
-    """Sinking of the tip [µm] of a massless strip under the weight of a point mass: m g L³/3EI."""
+    """Return the sinking of the tip [µm] of a massless strip under the weight of a point mass: m g L³/3EI."""
     mass, gravity = 1e-3, 0.1
     light = {"gel": {"youngs_modulus": 1e3 * SOFT, "poisson_ratio": 0.5, "density": 1e-3}}
     config = scene(

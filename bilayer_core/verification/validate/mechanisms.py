@@ -120,7 +120,7 @@ def rebound(dimension: int) -> tuple[float, float]:
 
 
 def rest_on_a_limit(dimension: int) -> tuple[float, float]:
-    """How far a pendulum that leans on a limit at 30° is beyond it [mrad], M/K + w/2."""
+    """Return how far a pendulum that leans on a limit at 30° is beyond it [mrad], M/K + w/2."""
     angle, stiffness = math.radians(30.0), 1e-1
     content = pendulum(angle, axis=(0, 1, 0), limits=[-1.0, 0.0], limit_stiffness=stiffness)
     simulator = Simulator(load_scene(content), dimension=dimension)
@@ -165,7 +165,7 @@ def rotating_guide(dimension: int) -> tuple[float, float]:
 
 
 def universal_joint(bend: float) -> tuple[float, float]:
-    """Largest difference of ω₂/ω₁ over a turn from cos β/(1 − sin²β cos²θ), above 0."""
+    """Return the largest difference of ω₂/ω₁ over a turn from cos β/(1 − sin²β cos²θ), above 0."""
     beta, speed = math.radians(bend), 20.0
     out = [math.cos(beta), 0.0, math.sin(beta)]
     turns = {"type": "guided", "mass": 1e-3, "turning": {}}

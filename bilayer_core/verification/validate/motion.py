@@ -142,7 +142,7 @@ def terminal_velocity(direction: str) -> tuple[float, float]:
 
 
 def slowing() -> tuple[float, float]:
-    """Speed [m/s] of a strip that a fluid at rest has slowed for 20 ms from 2 m/s: v = v₀/(1 + k v₀ t)."""
+    """Return the speed [m/s] of a strip that a fluid at rest has slowed for 20 ms from 2 m/s: v = v₀/(1 + k v₀ t)."""
     strip = rod([layer()], length=0.05, stations=5)
     simulator = Simulator(load_scene(scene([strip], fluid={"drag_along": 0.5, "drag_across": 1.0})), dt=2e-5)
     let_go(simulator, np.tile([0.0, 0.0, 2.0], (5, 1)))
@@ -152,7 +152,7 @@ def slowing() -> tuple[float, float]:
 
 
 def damped_fall() -> tuple[float, float]:
-    """Speed [m/s] of a strip that falls against mass damping α = 3/s for 0.4 s: −(g/α)(1 − e^(−α t))."""
+    """Return the speed [m/s] of a strip that falls against mass damping α = 3/s for 0.4 s: −(g/α)(1 − e^(−α t))."""
     strip = rod([layer()], length=0.05, stations=5)
     falling = scene([strip], damping={"mass": 3.0}, gravity=[0, 0, -10.0])
     simulator = Simulator(load_scene(falling), dt=1e-3)
@@ -165,7 +165,9 @@ WEAK = 1e-3
 
 
 def _way_fallen(duration: float, dimension: int, **steps) -> float:
-    """Height [m] by which a strip 1 m from the origin falls under weak gravity, with the digits of `position_low`."""
+    """Return the height [m] by which a strip 1 m from the origin falls under weak gravity, with the digits of
+    `position_low`.
+    """
     strip = rod([layer("bottom"), layer("top")], start=(1.0, 0.0, 0.7), stations=11)
     falling = scene([strip], gravity=[0, 0, -WEAK])
     falling["solver"] = {"model": "laminate", "dimension": dimension, **steps}

@@ -107,7 +107,9 @@ def _apart(compute: Callable[[float | None], float]) -> list[float]:
 
 
 def _axis(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Axes of a helix as columns, the last along it, the first towards the middle of its points; a point on it."""
+    """Return the axes of a helix as columns, the last along it, the first towards the middle of its points; a point on
+    it.
+    """
     center, step = len(points) // 2, len(points) // 6
     r = points[center - step : center + 2 * step + 1 : step]
     d = np.diff(r, axis=0)

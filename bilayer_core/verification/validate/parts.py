@@ -60,7 +60,7 @@ def ball(position, radius=0.02, mass=2.7e-3, **motion):
 
 
 def contact(barrier_distance=1e-3, coefficient=None, speed_threshold=1e-4):
-    """Contact settings of the paper, with friction if a coefficient is given."""
+    """Return the contact settings of the paper, with friction if a coefficient is given."""
     friction = {"coefficient": coefficient, "speed_threshold": speed_threshold}
     return {
         "barrier_distance": barrier_distance,

@@ -68,8 +68,8 @@ def spring(pitch_angle: float, layers: list[dict], stations: int, load: dict) ->
 
 @cache
 def compliance(pitch_angle: float, model: str, pairs: bool, edges_per_turn: int = EDGES_PER_TURN) -> np.ndarray:
-    """Extension and rotation about the axis per force, and per moment: [[m/N, m/(N m)], [rad/N, rad/(N m)]], of a
-    ribbon of one layer or of a pair of equal ones.
+    """Return the extension and rotation about the axis per force, and per moment: [[m/N, m/(N m)], [rad/N, rad/(N m)]],
+    of a ribbon of one layer or of a pair of equal ones.
     """
     layers = [layer("inner", THICKNESS / 2), layer("outer", THICKNESS / 2)] if pairs else [layer(thickness=THICKNESS)]
     stations = round(edges_per_turn * TURNS) + 1
@@ -87,7 +87,7 @@ def compliance(pitch_angle: float, model: str, pairs: bool, edges_per_turn: int 
 
 
 def _stiffnesses() -> tuple[float, float, float]:
-    """GJ, EI_B [N m²] and EA [N]."""
+    """Return GJ, EI_B [N m²] and EA [N]."""
     modulus, shear = GEL["youngs_modulus"], GEL["youngs_modulus"] / (2.0 * (1.0 + GEL["poisson_ratio"]))
     twisting = strip_torsion((shear, shear), (THICKNESS / 2, THICKNESS / 2), WIDTH)["laminate"]
     return twisting, modulus * WIDTH * THICKNESS**3 / 12.0, modulus * WIDTH * THICKNESS

@@ -21,7 +21,7 @@ LIMITS = {"two_rod": 0.01, "laminate": 1e-9}
 
 
 def curvature(model: str) -> tuple[float, float]:
-    """κH/η of the node in the middle, and Timoshenko's."""
+    """Return κH/η of the node in the middle, and Timoshenko's."""
     simulator = Simulator(load_scene(bending.strip(*RATIOS, STRAIN)), model=model, dimension=DIMENSION)
     simulator.solve_static()
     middle = simulator.curvatures[bending.STATIONS // 2]
@@ -29,7 +29,7 @@ def curvature(model: str) -> tuple[float, float]:
 
 
 def tip() -> tuple[float, float]:
-    """Distance of the heavy cantilever's tip from where it should be, over its length, and 0."""
+    """Return the distance of the heavy cantilever's tip from where it should be, over its length, and 0."""
     found = beams.cantilever_tip(beams.MESHES[-1], DIMENSION)
     return float(np.linalg.norm(np.subtract(found, beams.elastica_tip())) / beams.LENGTH), 0.0
 

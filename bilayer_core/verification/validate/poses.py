@@ -28,7 +28,7 @@ def _hub(dimension: int) -> Simulator:
 
 @cache
 def _on_the_way(dimension: int) -> tuple[float, float]:
-    """Largest speed [m/s] on a way, and the angle [rad] half-way through a turn that takes longer."""
+    """Return the largest speed [m/s] on a way, and the angle [rad] half-way through a turn that takes longer."""
     simulator, speed = _hub(dimension), 0.0
     turned = np.array([0.0, np.sin(0.5 * ANGLE), 0.0, np.cos(0.5 * ANGLE)])
     simulator.set_pose("hub", WAY)

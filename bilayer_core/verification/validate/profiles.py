@@ -45,7 +45,7 @@ TAPERS: dict[str, tuple[dict, dict, Callable]] = {
 
 
 def taper(name: str) -> tuple[float, float]:
-    """Deflection of the tip of a tapered cantilever under a force there [µm]."""
+    """Return the deflection of the tip of a tapered cantilever under a force there [µm]."""
     of_rod, of_layer, cube = TAPERS[name]
     force = 1e-4
     pull = [{"name": "pull", "rod": "rod", "position": LENGTH, "force": [0, 0, force]}]
@@ -64,7 +64,7 @@ def _spiral(edges: int) -> tuple[Array, Array]:
 
 
 def spiral(axis: int) -> tuple[float, float]:
-    """Tip [mm] of a strip whose natural curvature grows linearly."""
+    """Return the tip [mm] of a strip whose natural curvature grows linearly."""
     found, expected = _spiral(EDGES)
     return 1e3 * found[axis], 1e3 * expected[axis]
 
@@ -91,8 +91,8 @@ BILAYERS = {
 
 
 def local_curvature(name: str) -> tuple[float, float]:
-    """κH/η of a bilayer that varies along its path, at the node where it is furthest from Timoshenko's of the section
-    there.
+    """Return κH/η of a bilayer that varies along its path, at the node where it is furthest from Timoshenko's of the
+    section there.
     """
     moduli, thicknesses = BILAYERS[name]
     layers = [

@@ -57,8 +57,8 @@ def ring(layers: list[dict], edges: int = EDGES, **more) -> dict:
 
 
 def _circle(simulator: Simulator) -> tuple[Array, Array, Array]:
-    """Angles of nodes round the axis at the start, shape (n_node,), and directions outwards and along, shapes
-    (n_node, 3).
+    """Return the angles of nodes round the axis at the start, shape (n_node,), and directions outwards and along,
+    shapes (n_node, 3).
     """
     start = simulator.model.start_position
     angle = np.arctan2(start[:, 2], start[:, 0])
@@ -119,7 +119,7 @@ def _pulled_height(force: float) -> float:
 
 @cache
 def pulled(kind: str, part: float, edges: int = EDGES) -> float:
-    """Diameter between two opposite forces of a part of EI/R², outwards [m]; the ring is free."""
+    """Return the diameter between two opposite forces of a part of EI/R², outwards [m]; the ring is free."""
     layers, model, dimension = KINDS[kind]
     half, force = math.pi * RADIUS, part * BENDING / RADIUS**2
     loads = [
@@ -144,7 +144,7 @@ LARGE = (2.0, 8.0)
 
 
 def stretched(kind: str, part: float) -> tuple[float, float]:
-    """Diameter under a large force [m]."""
+    """Return the diameter under a large force [m]."""
     return pulled(kind, part), 2.0 * _pulled_height(part * BENDING / RADIUS**2)
 
 
@@ -160,7 +160,9 @@ STRAIN = 0.02
 
 @cache
 def strained(model: str, dimension: int) -> tuple[float, float, float]:
-    """Stretch, departure from a circle over the radius, and energy [J] of a ring whose inner layer is strained."""
+    """Return the stretch, departure from a circle over the radius, and energy [J] of a ring whose inner layer is
+    strained.
+    """
     inner = layer("inner", THICKNESS / 2, eigenstrain={"stimulus": "heat", "gain": STRAIN})
     layers = [inner, layer("outer", THICKNESS / 2, stiffness=0.5)]
     heat = {"heat": {"schedule": {"type": "hold", "value": 1.0}}}
@@ -186,7 +188,7 @@ def _energy_of_pair(model: str) -> float:
 
 @cache
 def largest_flat_twist(edges: int) -> float:
-    """Torque in B/R up to which a twisted ring of straight square rod is stable in its plane."""
+    """Return the torque in B/R up to which a twisted ring of straight square rod is stable in its plane."""
     side, modulus = 1e-3, GEL["youngs_modulus"]
     shear = modulus / (2.0 * (1.0 + GEL["poisson_ratio"]))
     torsion = strip_torsion((shear, shear), (side / 2, side / 2), side)["laminate"]
@@ -205,7 +207,7 @@ def largest_flat_twist(edges: int) -> float:
 
 @cache
 def rolling(coefficient: float) -> tuple[float, float]:
-    """Speed of a hoop that was set down spinning, when it has just ceased to slide, and ΩR/2 [m/s].
+    """Return the speed of a hoop that was set down spinning, when it has just ceased to slide, and ΩR/2 [m/s].
 
     Only nodes touch: with coarser edges or a shorter barrier it rolls on as a polygon, and slower with each corner.
     """

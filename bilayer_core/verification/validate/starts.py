@@ -57,21 +57,21 @@ def lying(start: str, dimension: int, height: float, barrier: float, stiffness: 
 
 @cache
 def rise(dimension: int) -> float:
-    """Height to which a barrier throws a strip that starts inside it [m]."""
+    """Return the height to which a barrier throws a strip that starts inside it [m]."""
     simulator = lying("placed", dimension, 0.5e-3 + GAP, BARRIER, SOFT, 1e-3)
     simulator.run(FLIGHT + 0.05)
     return simulator.statistics.com_max_height - (0.5e-3 + GAP)
 
 
 def _stored_height() -> float:
-    """Height at which a strip has the energy that the barrier stores at its gap [m]."""
+    """Return the height at which a strip has the energy that the barrier stores at its gap [m]."""
     stored = SOFT * (GAP - BARRIER) ** 2 * math.log(BARRIER / GAP)  # of each metre [J/m]
     return stored / (1000.0 * 0.01 * 1e-3 * GRAVITY)
 
 
 @cache
 def resting_gap(dimension: int) -> float:
-    """Gap at which a strip of 10 × 2 mm starts that settles, from inside the barrier [mm]."""
+    """Return the gap at which a strip of 10 × 2 mm starts that settles, from inside the barrier [mm]."""
     simulator = lying("settle", dimension, 1e-3 + 3e-4, 1e-3, 1e7, 2e-3)
     return 1e3 * (float(np.mean(simulator.positions[:, 2])) - 1e-3)
 

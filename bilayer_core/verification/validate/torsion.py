@@ -56,7 +56,9 @@ def twisted_strip(
 def torsional_stiffness(
     torsion: str, edges: int, model: str = "two_rod", section: str | None = None
 ) -> tuple[float, float]:
-    """Moment over twist per length in the middle half of the strip, away from what clamps do, and GJ [N m²]."""
+    """Return the moment over twist per length in the middle half of the strip, away from what clamps do, and GJ
+    [N m²].
+    """
     multiples, thickness, width = SECTIONS[section] if section else ((1.0, 1.0), THICKNESS, 0.01)
     moduli = tuple(SHEAR_MODULUS * multiple for multiple in multiples)
     declared = strip_torsion(moduli, thickness, width)[torsion]
@@ -83,7 +85,7 @@ def clamped_ends(torsion: str, edges: int) -> tuple[float, float]:
 
 @cache
 def _curvature_of_uniform_growth(edges: int) -> np.ndarray:
-    """χ of both layers at inner nodes away from the ends [1/m], shape (2, n)."""
+    """Return χ of both layers at inner nodes away from the ends [1/m], shape (2, n)."""
     layers = [layer("bottom"), layer("top", eigenstrain={"stimulus": "heat", "gain": WAVE})]
     return curvatures(layers, edges)[:, edges // 4 : 3 * edges // 4]
 
@@ -91,7 +93,7 @@ def _curvature_of_uniform_growth(edges: int) -> np.ndarray:
 def curvatures(
     layers: list[dict], edges: int, model: str = "two_rod", coupling: dict[str, float] | None = None
 ) -> np.ndarray:
-    """χ of each strand of a clamped strip in equilibrium [1/m], shape (n_strand, edges + 1)."""
+    """Return χ of each strand of a clamped strip in equilibrium [1/m], shape (n_strand, edges + 1)."""
     config = scene(
         [rod(layers, LENGTH, edges + 1, clamp_start="wall")],
         bodies=[fixed()],
@@ -104,13 +106,15 @@ def curvatures(
 
 
 def zigzag(edges: int) -> tuple[float, float]:
-    """Largest alternation of curvature from node to node of either layer, over the curvature; 0."""
+    """Return the largest alternation of curvature from node to node of either layer, over the curvature; 0."""
     chi = _curvature_of_uniform_growth(edges)
     return np.abs(chi[:, :-2] - 2.0 * chi[:, 1:-1] + chi[:, 2:]).max() / 4.0 / np.abs(chi).mean(), 0.0
 
 
 def wave_strip(edges: int) -> tuple[list[dict], np.ndarray]:
-    """Layers of which the top one grows by `WAVE` cos(2π s/L), and that strain at the edges, shape (edges,)."""
+    """Return the layers of which the top one grows by `WAVE` cos(2π s/L), and that strain at the edges, shape
+    (edges,).
+    """
     size = LENGTH / edges
     strain = WAVE * np.cos(2.0 * np.pi * (np.arange(edges) + 0.5) / edges)
     laws = [
@@ -121,14 +125,14 @@ def wave_strip(edges: int) -> tuple[list[dict], np.ndarray]:
 
 
 def amplitude(chi: np.ndarray, strain: np.ndarray) -> float:
-    """κH/η of χ at inner nodes [1/m], projected on the strain of the edges in the middle half."""
+    """Return κH/η of χ at inner nodes [1/m], projected on the strain of the edges in the middle half."""
     at_nodes = 0.5 * (strain[:-1] + strain[1:])
     middle = slice(len(strain) // 4, 3 * len(strain) // 4)
     return -(chi[middle] @ at_nodes[middle]) / (at_nodes[middle] @ at_nodes[middle]) * 2e-3
 
 
 def wave_curvature(edges: int, model: str = "two_rod", coupling: dict[str, float] | None = None) -> tuple[float, float]:
-    """κH/η where growth is a wave along the strip, and Timoshenko's."""
+    """Return κH/η where growth is a wave along the strip, and Timoshenko's."""
     layers, strain = wave_strip(edges)
     chi = curvatures(layers, edges, model, coupling)[:, 1:-1].mean(axis=0)
     return amplitude(chi, strain), timoshenko(1.0, 1.0)

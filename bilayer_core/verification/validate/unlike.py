@@ -65,7 +65,7 @@ def _hanging(section: Section, direction: str, edges: int) -> tuple[Array, Array
 
 
 def hanging(section: Section, direction: str, axis: int) -> tuple[float, float]:
-    """Coordinate of the end of a strip under its weight [mm]."""
+    """Return the coordinate of the end of a strip under its weight [mm]."""
     found, answer = _hanging(section, direction, EDGES)
     return 1e3 * found[axis], 1e3 * answer[axis]
 
@@ -77,7 +77,7 @@ def order_in_the_mesh(section: Section, direction: str) -> tuple[float, float]:
 
 
 def covered_part() -> tuple[float, float]:
-    """Sinking of the end of a strip with a stiff and heavy layer on the middle 40 % [mm]."""
+    """Return the sinking of the end of a strip with a stiff and heavy layer on the middle 40 % [mm]."""
     whole = Section(WIDTH, (1e6, 1e6), (1000.0, 3000.0), (3e-3, 1e-3))
     bare = Section(WIDTH, (1e6, 1e6), (1000.0, 3000.0), (3e-3, 0.0))
     config = scene_of(whole, gravity=in_space(ACROSS))
@@ -147,7 +147,7 @@ def drag() -> tuple[float, float]:
 
 
 def shaken() -> tuple[float, float]:
-    """Amplitude across [µm] of the end of a viscous strip whose hub, far heavier, is shaken along it.
+    """Return the amplitude across [µm] of the end of a viscous strip whose hub, far heavier, is shaken along it.
 
     Inertia at the height c is a couple of the density λ c a per length, that is, a force λ c a across at the free end.
     """

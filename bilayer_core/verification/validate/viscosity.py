@@ -63,7 +63,7 @@ def damping_ratio(
 
 
 def creep() -> tuple[float, float]:
-    """Strain of a light strip one retardation time after a sudden pull, over that at rest."""
+    """Return the strain of a light strip one retardation time after a sudden pull, over that at rest."""
     time, force, length = 0.05, 1e-3, 0.01
     light = gel(time) | {"density": 1e-3}
     strip = rod([layer()], length=length, stations=6, clamp_start="wall", name="strip")
@@ -77,8 +77,8 @@ def creep() -> tuple[float, float]:
 
 
 def spun(integrator: str) -> float:
-    """Angular momentum that a soft viscous strip loses in half a second at 20 rad/s once it has stretched, over its
-    own.
+    """Return the angular momentum that a soft viscous strip loses in half a second at 20 rad/s once it has stretched,
+    over its own.
     """
     ribbon = rod([layer(thickness=2e-3)], length=LENGTH, stations=11, start=(-0.5 * LENGTH, 0, 0))
     solver = {"dt": 1e-3, "integrator": integrator, "newton_tolerance": 1e-11}

@@ -49,11 +49,11 @@ class Case:
     shifted: bool
 
     def element_length(self, beam: Cantilever) -> float:
-        """[m]"""
+        """Return the length of an element [m]."""
         return beam.length / (self.elements - 0.5 if self.shifted else self.elements)
 
     def start(self, beam: Cantilever) -> float:
-        """x of the first node [m]."""
+        """Return x of the first node [m]."""
         return -0.5 * self.element_length(beam) if self.shifted else 0.0
 
     def stride(self, beam: Cantilever) -> int:
