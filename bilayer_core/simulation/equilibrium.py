@@ -39,6 +39,8 @@ round."""
 LONGEST_AFTER_FAILURE = 0.6
 """Of the length of a round that failed with careful growth: Newton converges up to there, and rounds of one length come
 to rest geometrically."""
+RECOVERY = 1.03
+"""Growth of that length with every round that succeeds, as a round may have failed far from where rest is."""
 SETTLED, LONGEST = 1.0, 100.0
 """Two rounds at least so long [s] must find the shape at rest, one after the other but for failures, which come
 from rounding where nothing holds the robot; no round is longer than the second."""
@@ -211,7 +213,7 @@ class _Search:
                     longest = min(longest, LONGEST_AFTER_FAILURE * length)
                 length, settled, growth = SHRINKAGE * length, 0, self.growth_after_failure
                 continue
-            enough = min(SETTLED, longest)
+            enough, longest = min(SETTLED, longest), min(RECOVERY * longest, LONGEST)
             settled = settled + 1 if moved <= self.tolerance and length >= enough else 0
             if settled == 2:
                 return self._report(attempt.residual * length)
