@@ -42,8 +42,8 @@ to rest geometrically."""
 RECOVERY = 1.03
 """Growth of that length with every round that succeeds, as a round may have failed far from where rest is."""
 SETTLED, LONGEST = 1.0, 100.0
-"""Two rounds at least so long [s] must find the shape at rest, one after the other but for failures, which come
-from rounding where nothing holds the robot; no round is longer than the second."""
+"""Two rounds at least so long [s], or as long as failures allow, must find the shape at rest, one after the other but
+for failures, which come from rounding where nothing holds the robot; no round is longer than the second."""
 MAX_ROUNDS = 300
 WORTH_KEEPING = 1e-6
 """Of the longest rod: displacement of a round without convergence that is no rounding."""
@@ -189,7 +189,7 @@ class _Search:
     def run(self) -> StaticReport:
         state, engine = self.state, self.stepper.engine
         first_position, start = state.position.copy(), state.copy()
-        length, moved, settled, growth, longest = FIRST, math.inf, 0, GROWTH, LONGEST
+        length, moved, before, settled, growth, longest = FIRST, math.inf, math.inf, 0, GROWTH, LONGEST
         while self.rounds < MAX_ROUNDS:
             if self.light.exists:
                 self._drive(self.stepper)
@@ -204,7 +204,7 @@ class _Search:
                 if length < SHORTEST:
                     raise self._failure(self._why(attempt), moved)
                 continue
-            moved = engine.moved
+            moved, before = engine.moved, moved
             if np.abs(state.position - first_position).max() > OUT_OF_SIGHT * self.size:
                 raise self._failure("nothing holds the robot, or not all of it", moved)
             start.take(state)
@@ -214,7 +214,10 @@ class _Search:
                 length, settled, growth = SHRINKAGE * length, 0, self.growth_after_failure
                 continue
             enough, longest = min(SETTLED, longest), min(RECOVERY * longest, LONGEST)
-            settled = settled + 1 if moved <= self.tolerance and length >= enough else 0
+            at_rest = length >= enough and moved <= self.tolerance
+            if length < SETTLED:  # rounds come to rest geometrically: what all that follow would move
+                at_rest &= moved * moved <= self.tolerance * (before - moved)
+            settled = settled + 1 if at_rest else 0
             if settled == 2:
                 return self._report(attempt.residual * length)
             length = max(enough, length) if moved <= self.tolerance else min(growth * length, longest)
