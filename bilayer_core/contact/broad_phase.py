@@ -85,8 +85,8 @@ def _sees(search, a, p, k, touch):
 
 @kernel
 def _arc_between(search, rod, first, last, k):
-    """No less than the arc distance of any place from `first` to `last` along a rod from its edge k [m]; round a closed
-    rod the shorter way.
+    """Return a lower bound of the arc distance of any place from `first` to `last` along a rod from its edge k [m];
+    round a closed rod the shorter way.
     """
     begin, end, once_round = search.edge_arc[k, 0], search.edge_arc[k, 1], search.rod_length[rod]
     return min(max(begin - first, last - end), once_round - max(end - last, first - begin))
@@ -112,7 +112,7 @@ def _come_near(box, a, b, distance):
 
 @kernel
 def _along(position, i, d0, d1, d2):
-    """Part of the edge (i, i+1) along a unit vector [m]."""
+    """Return the component of the edge (i, i+1) along a unit vector [m]."""
     return (
         d0 * (position[i + 1, 0] - position[i, 0])
         + d1 * (position[i + 1, 1] - position[i, 1])

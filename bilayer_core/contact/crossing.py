@@ -119,7 +119,7 @@ def _thickness(surfaces, s):
 
 @kernel
 def _distance(surfaces, s, a, b, t):
-    """Signed distance of surface s at the part t from a to b [m], and its slope along t [m]."""
+    """Return the signed distance of surface s at the part t from a to b [m], and its slope along t [m]."""
     size = surfaces.size
     w0, w1, w2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     x, y, z = a[0] + t * w0, a[1] + t * w1, a[2] + t * w2

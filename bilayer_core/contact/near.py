@@ -84,7 +84,7 @@ def gap_normal(surfaces, at, radius, s, x0, x1, x2):
 
 @kernel
 def rod_point(surfaces, at, i, mix):
-    """Place of a contact point of a rod at node i [m], by its mix (c_b, c_a, s_b, s_a, h, w), as a tuple."""
+    """Return the place of a contact point of a rod at node i [m], by its mix (c_b, c_a, s_b, s_a, h, w), as a tuple."""
     b, a = surfaces.node_edges[i, 0], surfaces.node_edges[i, 1]
     along_b, along_a, part_b, part_a, h, w = mix
     along_b, along_a = along_b * at.length[b], along_a * at.length[a]
@@ -101,14 +101,14 @@ def rod_point(surfaces, at, i, mix):
 
 @kernel
 def mix_of(surfaces, k):
-    """Mix of the contact point of pair k; see `rod_point`."""
+    """Return the mix of the contact point of pair k; see `rod_point`."""
     mix = surfaces.near_mix
     return mix[k, 0], mix[k, 1], mix[k, 2], mix[k, 3], mix[k, 4], mix[k, 5]
 
 
 @kernel
 def place_of(surfaces, at, k):
-    """Place of the contact point of pair k [m], as a tuple."""
+    """Return the place of the contact point of pair k [m], as a tuple."""
     if surfaces.near_arm[k]:
         return rod_point(surfaces, at, surfaces.near_node[k], mix_of(surfaces, k))
     return row(at.contact_point, surfaces.near_contact_point[k])
@@ -227,8 +227,8 @@ def _list_across(surfaces, at, s, i, mix, spacing, radius, weight, limit, count)
 
 @kernel
 def list_near(surfaces, at, margin):
-    """List pairs whose gap is at most max(d̂ + m, smallest gap + 2 m), by surfaces and then by contact points; of points
-    between stations those within d̂ + m. Where there are such, points at stations have no weight.
+    """List pairs whose gap is at most max(d̂ + m, smallest gap + 2 m), by surfaces and then by contact points; of
+    points between stations those within d̂ + m. Where there are such, points at stations have no weight.
 
     The list with its gaps, the extents of surfaces and where everything is are written to `surfaces`; pairs beyond the
     capacity of the list are counted but not written.

@@ -98,7 +98,7 @@ def _square_distance(position, step, fraction, i, s, j):
 
 @kernel
 def _moved(position, step, fraction, i):
-    """Row i of x + fraction · step, as a tuple."""
+    """Return row i of x + fraction · step, as a tuple."""
     return (
         position[i, 0] + fraction * step[i, 0],
         position[i, 1] + fraction * step[i, 1],
@@ -108,7 +108,7 @@ def _moved(position, step, fraction, i):
 
 @kernel
 def _square_distance_of_rails(rails, strands, system, at, fraction, i, s, j):
-    """Likewise between rails [m²]."""
+    """Return the square of the distance that `_square_distance` returns, between rails instead of segments [m²]."""
     x0 = rail_in_step(rails, strands, system, at, i, fraction)
     x1 = rail_in_step(rails, strands, system, at, i + 1, fraction)
     y0 = rail_in_step(rails, strands, system, at, j, fraction)

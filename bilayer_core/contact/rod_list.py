@@ -131,8 +131,8 @@ def list_serves(rods, position, step, fraction, move, stray):
 
 @kernel
 def begin_list(rods, position, step, fraction, move, stray):
-    """Have the motion for which a list is made next, the mean of all nodes taken off at either end; nodes go on from
-    its beginning. Parameters are as for `list_serves`; returns the margin [m].
+    """Take over the motion for which a list is made next, the mean of all nodes taken off at either end; nodes go on
+    from its beginning. Parameters are as for `list_serves`; returns the margin [m].
     """
     ahead = min(max(AHEAD * rods.unit / move, 1.0), MOST_AHEAD) if move > 0.0 else 1.0
     base, tip, last, length = rods.search.base, rods.search.tip, rods.last, ahead * fraction

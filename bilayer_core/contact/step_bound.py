@@ -64,8 +64,8 @@ def _fastest(motion, b, extent):
 
 @kernel
 def _acceleration_of_node(surfaces, system, at, i):
-    """Bound of the acceleration of a node during a step, in units of its length [m]: one that a body holds moves on an
-    arc.
+    """Return a bound of the acceleration of a node during a step, in units of its length [m]: one that a body holds
+    moves on an arc.
     """
     motion, b = system.motion, surfaces.moved_by[i]
     if b < 0:
@@ -78,7 +78,7 @@ def _acceleration_of_node(surfaces, system, at, i):
 
 @kernel
 def _speed_of_node(surfaces, system, at, i):
-    """Bound of its speed likewise [m]."""
+    """Return a bound of its speed likewise [m]."""
     step = system.node_step
     start = math.sqrt(step[i, 0] ** 2 + step[i, 1] ** 2 + step[i, 2] ** 2)
     return start + _acceleration_of_node(surfaces, system, at, i)

@@ -111,7 +111,7 @@ def corner_after(actuation, time, same):
 
 @kernel
 def take_first_stimuli(actuation, begin, same, inputs):
-    """Stimuli at the start of a step, after any jump there."""
+    """Write the stimuli at the start of a step, after any jump there."""
     for c in range(actuation.stimulus.shape[0]):
         inputs.first[c] = _value(actuation.stimulus, c, _span_until(actuation.stimulus, c, begin + same), begin)
 

@@ -59,7 +59,7 @@ def _least_energy(model: Model) -> float:
 
 
 def restitution_of(model: Model, sizes: dict[str, int]) -> Restitution:
-    """Absent where no impact is damped."""
+    """Return the record of impacts, absent where none is damped."""
     pairs, contact = model.impact_pairs, model.scene.contact
     if not len(pairs):
         return Restitution.absent()
@@ -78,7 +78,7 @@ def restitution_of(model: Model, sizes: dict[str, int]) -> Restitution:
 
 
 def slips_of(model: Model, sizes: dict[str, int]) -> Slips:
-    """Absent if nothing slides against friction."""
+    """Return the record of slips, absent if nothing slides against friction."""
     law = model.scene.contact.friction if model.scene.contact else None
     if law is None or not law.acts:
         return Slips.absent()
@@ -95,8 +95,8 @@ def rod_contact_of(
     law: Friction | None,
     **motion: Array,
 ) -> RodContact:
-    """With contacts of now, and `old` ones of the start of a stage; `law` is the scene's or one with other
-    coefficients, `motion` that of the list of near rods.
+    """Return the record of contacts of rods, with those of `now` and the `old` ones of the start of a stage; `law` is
+    the scene's or one with other coefficients, `motion` that of the list of near rods.
     """
     contact = model.scene.contact
     return RodContact.zeros(
@@ -117,7 +117,7 @@ def rod_contact_of(
 
 
 def contact_columns_of(model: Model, sizes: dict[str, int], capacity: int) -> ContactColumns:
-    """With capacity for so many contacts of barrier and friction together."""
+    """Return the columns of contacts, with capacity for so many of barrier and friction together."""
     return ContactColumns.zeros(
         sizes | {"contact": capacity},
         strand=np.repeat(np.arange(len(model.strands)), [s.node_count for s in model.strands]),

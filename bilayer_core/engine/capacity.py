@@ -65,17 +65,17 @@ def surface_pairs_for(needed: int) -> int:
 
 
 def rod_pairs_for(model: Model, needed: int) -> int:
-    """Likewise for points near other rods."""
+    """Return the capacity for more points near other rods than `needed`; see `surface_pairs_for`."""
     return _twice(needed, MOST_PAIRS, "points of rods are near other rods", _apart(), _densest(model))
 
 
 def contacts_for(model: Model, needed: int) -> int:
-    """Likewise for places where rods touch."""
+    """Return the capacity for more places where rods touch than `needed`; see `surface_pairs_for`."""
     return _twice(needed, MOST_CONTACTS, "points of rods touch other rods", _apart(), _densest(model))
 
 
 def columns_for(needed: int, rows: int) -> int:
-    """Likewise for columns of the border, of so many rows each."""
+    """Return the capacity for more columns of the border than `needed`, each of `rows`; see `surface_pairs_for`."""
     most = max(int(LARGEST_BORDER / (ROW_MEMORY * rows)), 1)
     return _twice(needed, most, f"of {rows} unknowns belong to edges of rods that touch", _apart())
 

@@ -13,7 +13,7 @@ from bilayer_core.model.records.step import Configuration, Stage, StateArrays
 
 @kernel
 def take_step(step, alpha, node_unknown, edge_unknown, position, total_angle, position_out, angle_out, total_angle_out):
-    """x + α δx of nodes, α δθ of edges and their turn since the start of the step."""
+    """Write x + α δx of nodes, α δθ of edges and their turn since the start of the step."""
     for i in range(node_unknown.shape[0]):
         d = node_unknown[i]
         for c in range(3):
@@ -26,7 +26,7 @@ def take_step(step, alpha, node_unknown, edge_unknown, position, total_angle, po
 
 @kernel
 def second_director(tangent, director1, director2_out):
-    """m2 = t × m1."""
+    """Write m2 = t × m1."""
     for k in range(tangent.shape[0]):
         director2_out[k, 0] = tangent[k, 1] * director1[k, 2] - tangent[k, 2] * director1[k, 1]
         director2_out[k, 1] = tangent[k, 2] * director1[k, 0] - tangent[k, 0] * director1[k, 2]
@@ -35,7 +35,7 @@ def second_director(tangent, director1, director2_out):
 
 @kernel
 def attached_positions(body, local, position, rotation, arm_out, position_out):
-    """X + R r of points r of bodies, and the arms R r [m]."""
+    """Write X + R r of points r of bodies, and the arms R r [m]."""
     for k in range(body.shape[0]):
         b = body[k]
         for i in range(3):
@@ -46,7 +46,7 @@ def attached_positions(body, local, position, rotation, arm_out, position_out):
 
 @kernel
 def attached_clamp_edges(body, local_tangent, local_director1, rotation, first, tangent, director1, director2):
-    """t and m1 of clamp edges, edges from `first` on, turned with their bodies, and m2 = t × m1."""
+    """Write t and m1 of clamp edges, edges from `first` on, turned with their bodies, and m2 = t × m1."""
     for k in range(body.shape[0]):
         b, w = body[k], first + k
         for i in range(3):
@@ -61,7 +61,7 @@ def attached_clamp_edges(body, local_tangent, local_director1, rotation, first, 
 
 @kernel
 def attached_rotations(body, local, rotation, rotation_out):
-    """R L of matrices L of bodies."""
+    """Write R L of matrices L of bodies."""
     for k in range(body.shape[0]):
         b = body[k]
         for i in range(3):
@@ -74,7 +74,7 @@ def attached_rotations(body, local, rotation, rotation_out):
 
 @kernel
 def _update_constrained(constrained, strands, at):
-    """Nodes and clamps' directions that bodies hold."""
+    """Update the nodes and the directions of clamps that bodies hold."""
     attached_positions(
         constrained.body, constrained.position, at.pose_position, at.rotation, at.arm, at.attached_position
     )
@@ -95,7 +95,7 @@ def _update_constrained(constrained, strands, at):
 
 @kernel
 def _update_surfaces(surfaces, at):
-    """Points of bodies and surfaces."""
+    """Update the points of bodies and the surfaces."""
     if not surfaces.exists:
         return
     position, rotation = at.pose_position, at.rotation
@@ -171,7 +171,7 @@ def copy_prescribed(bodies, source_position, source_rotation, at):
 
 @piece(int, Problem, Configuration, float, Stage, Configuration)
 def move(p, base, alpha, stage, at):
-    """Become `base` moved by α times the step in `System`."""
+    """Copy `base`, moved by α times the step in `System`."""
     bodies, strands, step, body_step = p.bodies, p.strands, p.system.step, p.system.body_step
     copy_prescribed(bodies, base.pose_position, base.rotation, at)
     take_step(
@@ -204,8 +204,8 @@ def move(p, base, alpha, stage, at):
 
 @kernel
 def departure_of_constrained(constrained, stage, at):
-    """Departure of what bodies hold: that of a free body, and of the arm R̃ r with it; a prescribed one has digits to
-    spare, because its inertia moves nothing.
+    """Write the departure of nodes that bodies hold: that of a free body, and of the arm R̃ r with it; a prescribed one
+    has digits to spare, because its inertia moves nothing.
     """
     for k in range(constrained.node.shape[0]):
         f, i = constrained.free[k], constrained.node[k]
@@ -221,7 +221,7 @@ def departure_of_constrained(constrained, stage, at):
 
 @kernel
 def clear_departure(at):
-    """Be where inertia takes everything."""
+    """Clear the departure: everything is where inertia takes it."""
     at.departure[:] = 0.0
     at.body_departure[:] = 0.0
     at.body_departure_quaternion[:] = 0.0
@@ -229,7 +229,7 @@ def clear_departure(at):
 
 @kernel
 def measure_departure(bodies, stage, at):
-    """Departure of a configuration that was not moved from where inertia takes everything: to last digits of its
+    """Measure how far a configuration that was not moved is from where inertia takes everything: to last digits of its
     positions.
     """
     for i in range(at.position.shape[0]):

@@ -93,7 +93,7 @@ class Engine:
         self.start_over(-math.inf)
 
     def take_scene(self, model: Model, control: StepControl, newton_tolerance: float, max_iterations: int) -> None:
-        """Have the same model with another scene, of which the arrays know nothing but coefficients of friction."""
+        """Take another scene of the same model, of which the arrays know nothing but coefficients of friction."""
         self._model, self._control, self._newton = model, control, (newton_tolerance, max_iterations)
         self._storage.take_scene(model)
         self._state = self._integration = None
@@ -171,7 +171,7 @@ class Engine:
         self.gap = self._outcome.gap
 
     def reserve(self, status: int, state: State) -> bool:
-        """Have the capacity that a step from a state lacked; false if that is not what it lacked.
+        """Add the capacity that a step from a state lacked; return false if that is not what it lacked.
 
         Raises
         ------

@@ -90,7 +90,7 @@ def fastest(norm, state):
 
 @kernel
 def _of_nodes(weight, before, after, half, first, last):
-    """Mean square of D along a strand [m²]."""
+    """Return the mean square of D along a strand [m²]."""
     total = 0.0
     for i in range(first, last):
         square = 0.0

@@ -125,7 +125,7 @@ class Evaluator:
         system.step[:], system.body_step[:] = step, body_step
 
     def transport_frames(self, base: Configuration, angle: Array, at: Configuration) -> None:
-        """Have frames of `base`, carried to the positions of `at` and turned by `angle` [rad], shape (n_edge,)."""
+        """Write the frames of `base`, carried to the positions of `at` and turned by `angle` [rad], shape (n_edge,)."""
         at.angle[:] = angle
         transport_frames(self.problem, base, at)
 
@@ -188,7 +188,7 @@ class Evaluator:
         stand_still_stage(self.problem, self._arrays, at, False, self.stage)
 
     def set_drive(self, rest_edge: Array, rest_joint: Array, load_factor: Array) -> None:
-        """Strains without stress, and factors of loads."""
+        """Set the strains without stress, and the factors of loads."""
         stage = self.stage
         stage.rest_edge[:], stage.rest_joint[:], stage.load_factor[:] = rest_edge, rest_joint, load_factor
 
@@ -205,7 +205,7 @@ class Evaluator:
     # forces
 
     def _select(self, at: Configuration, forces: Iterable[str] | None) -> None:
-        """Which forces are computed, all that the scene has or some by name.
+        """Select the forces to compute, all that the scene has or some by name, and start the elements.
 
         Raises
         ------

@@ -131,7 +131,9 @@ def clear(counts: Counts) -> None:
 
 @kernel
 def _end_of_fixed(control, clock):
-    """End of the present fixed step, of which parts may be done: on the grid of multiples of dt if its start is."""
+    """Return the end of the present fixed step, of which parts may be done: on the grid of multiples of dt if its start
+    is.
+    """
     begin, end = clock.time[0], (clock.step[0] + 1.0) * control.dt
     on_grid = end - control.dt <= begin + control.same and begin < end - control.same
     return end if on_grid else begin + control.dt
@@ -165,7 +167,7 @@ def _end_of_adaptive(run, until):
 
 @kernel
 def _begin_again_after_jump(run):
-    """Where something jumps, start with the first step's length, and without a history that a load's jump ends."""
+    """Begin again where something jumps: with the first step's length, without a history that a load's jump ends."""
     control, clock = run.control, run.clock
     jumped = jumps_at(run.actuation, clock.time[0], control.same)
     if jumped > 0:

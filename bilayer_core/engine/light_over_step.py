@@ -65,7 +65,7 @@ def begin_light(p, state):
 
 @kernel
 def see_light(light, state, elapsed):
-    """Have in `seen` what laws see at the start of the step and at a time in it [s]."""
+    """Write into `seen` what laws see at the start of the step and at a time in it [s]."""
     _see(light, state.light_rate, elapsed, 1)
 
 

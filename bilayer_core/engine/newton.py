@@ -126,7 +126,7 @@ def bound(p, at):
 
 @kernel
 def _move_constrained(constrained, system, at):
-    """Displacements of nodes that bodies hold."""
+    """Write the displacements of nodes that bodies hold."""
     for k in range(constrained.node.shape[0]):
         i, b = constrained.node[k], constrained.body[k]
         r0, r1, r2 = system.motion[b, 3], system.motion[b, 4], system.motion[b, 5]
@@ -137,7 +137,7 @@ def _move_constrained(constrained, system, at):
 
 @kernel
 def _move_prescribed(bodies, start, position, rotation, motion):
-    """Displacements and rotation vectors of prescribed bodies from a configuration to the given poses of all."""
+    """Write displacements and rotation vectors of prescribed bodies from a configuration to given poses."""
     for k in range(bodies.prescribed.shape[0]):
         b = bodies.prescribed[k]
         for c in range(3):

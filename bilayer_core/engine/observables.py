@@ -130,7 +130,7 @@ def _leave_out(body, gradient, wrench):
 
 @kernel
 def _observe_clamps(p, at, out):
-    """Force [N] and moment about its position [N m] that the rods which a body holds exert on it.
+    """Write the force [N] and the moment about its position [N m] that the rods which a body holds exert on it.
 
     They are −∂Φ/∂X and −∂Φ/∂φ of the potential Φ of the step through the nodes x = X + ρ and the fixed directions t
     that bodies hold (`engine.linear.attachments`): with the gradients g of a node and (g, g_θ) of a clamp edge

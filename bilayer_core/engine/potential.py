@@ -50,13 +50,15 @@ def start_stage(p, start, stage):
 
 @piece(bool, Problem, Configuration, Stage)
 def update_lagged(p, at, stage):
-    """Let forces take from a configuration what they hold fixed between moves; whether any does."""
+    """Let forces take from a configuration what they hold fixed between moves; return whether any does."""
     return _call_all(p, p.forces.update_lagged, at, stage)
 
 
 @piece(bool, Problem, Configuration, Stage)
 def settle_forces(p, at, stage):
-    """Let forces take from a minimum of the potential what they froze at the start of the stage; whether any does."""
+    """Let forces take from a minimum of the potential what they froze at the start of the stage; return whether any
+    does.
+    """
     return _call_all(p, p.forces.settle, at, stage)
 
 
@@ -111,7 +113,7 @@ def add_forces(p, at, stage, with_hessian, again):
 
 @piece(int, Problem, Configuration)
 def expand_to_unknowns(p, at):
-    """Hand first derivatives on from nodes, edges, pairs and bodies to the unknowns."""
+    """Carry first derivatives on from nodes, edges, pairs and bodies to the unknowns."""
     expand_gradient(p.bonds, p.strands, p.sums)
     condense_gradient(p.constrained, p.strands, at, p.sums)
     return READY

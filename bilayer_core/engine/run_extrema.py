@@ -79,7 +79,7 @@ def count_end(p, state, at, work, gap, time, extrema):
 
 @kernel
 def _count_contacts(surfaces, time, extrema):
-    """Nodes that touch surfaces, themselves or with a border; near pairs are in the order of surfaces."""
+    """Count the nodes that touch each surface, themselves or with a border; near pairs are in the order of surfaces."""
     if not surfaces.exists:
         return
     count, last = extrema.nodes, extrema.last_surface

@@ -165,7 +165,7 @@ def _spin_without_moment(second_moment, f, rotation, b, momentum, length, turned
 
 @piece(int, Problem, StateArrays, Work, StageInputs, int, Point, Configuration)
 def predict_stage(p, state, work, inputs, n, previous, start):
-    """Frozen data of stage n from its origin; puts the origin of what bodies hold to where it has their velocity.
+    """Freeze the data of stage n from its origin; put the origin of what bodies hold to where it has their velocity.
 
     `previous` is the end of the stage before, or the start of the step, and `start` its configuration. The turn of
     edges in `work` is that from the start of the step, where positions are those of `state`, to `start`.
@@ -260,7 +260,7 @@ def _take_twist(start, stage):
 
 @piece(int, Problem, StateArrays, Configuration, bool, Stage)
 def stand_still_stage(p, state, start, with_fluid, stage):
-    """Frozen data of a stage in which inertia wants everything to stay where it is.
+    """Freeze the data of a stage in which inertia wants everything to stay where it is.
 
     Forces see velocities as displacements from an origin. `with_fluid` says whether inertia of the fluid wants the
     fluid's momentum at `start` with these velocities to stay, too, instead of asking for nothing.
@@ -303,7 +303,7 @@ def stand_still_stage(p, state, start, with_fluid, stage):
 
 @kernel
 def _set_back(rotation, b, length, w0, w1, w2, out, c):
-    """out[c] = (1 − length [ω]×) rotation[b]"""
+    """Write out[c] = (1 − length [ω]×) rotation[b]."""
     for j in range(3):
         u0, u1, u2 = rotation[b, 0, j], rotation[b, 1, j], rotation[b, 2, j]
         out[c, 0, j] = u0 - length * (w1 * u2 - w2 * u1)

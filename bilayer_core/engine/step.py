@@ -53,7 +53,7 @@ with it the faces of its rod.
 
 @kernel
 def _grow(drives, law_strain, rest_edge_out, rest_joint_out):
-    """Rest strains of edges and joints from the eigenstrain of laws."""
+    """Write the rest strains of edges and joints from the eigenstrain of laws."""
     copy(drives.rest_strain, rest_edge_out)
     for k in range(drives.driven_edge.shape[0]):
         rest_edge_out[drives.driven_edge[k]] += drives.driven_weight[k] * law_strain[drives.driven_law[k]]

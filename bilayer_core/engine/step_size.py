@@ -82,5 +82,5 @@ def completed(time, rate):
 
 @exact_kernel
 def next_end(time, rate):
-    """When the period ends that has not ended at `time` [s]."""
+    """Return the end [s] of the period that has not ended at `time` [s]."""
     return (completed(time, rate) + 1) / rate

@@ -167,7 +167,7 @@ class Storage:
         )
 
     def take_scene(self, model: Model) -> None:
-        """Have the same model with another scene, whose coefficients of friction may be others."""
+        """Take another scene of the same model, whose coefficients of friction may be others."""
         before, law = (
             friction_law(of.scene, of.forces, self._friction) if of.scene.contact else None
             for of in (self._model, model)
@@ -177,7 +177,8 @@ class Storage:
             self._problem = self._make()
 
     def set_friction(self, given: Array) -> None:
-        """Have the coefficients of friction of a state (`State.friction`) in the records, before something is computed.
+        """Write the coefficients of friction of a state (`State.friction`) to the records, before something is
+        computed.
 
         Like `grow`, it leaves contacts and sums as they are.
         """
@@ -187,7 +188,7 @@ class Storage:
                 self._problem = self._make()
 
     def grow(self, status: int) -> bool:
-        """Have the capacity that a kernel lacked; false if that is not what it lacked.
+        """Add the capacity that a kernel lacked; return false if that is not what it lacked.
 
         Contacts of friction, and which forces are selected, stay.
 
@@ -250,7 +251,7 @@ def new_points(sizes: dict[str, int], count: int) -> list[Point]:
 
 
 def new_work(sizes: dict[str, int], configurations: list[Configuration], stages: int) -> Work:
-    """Room for steps of so many stages; `sizes` as in `model.sizes`."""
+    """Return arrays for steps of so many stages; `sizes` as in `model.sizes`."""
     first, origin, end = new_points(sizes, 3)
     stage = Stage.zeros(sizes)
     stage.origin_rotation[-1] = np.eye(3)

@@ -120,7 +120,7 @@ def fluid_momentum(fluid, at):
 
 @kernel
 def move_fluid(fluid, raised, velocity, strain_rate):
-    """Have the velocities of nodes [m/s], shape (n_node, 3), and of raised directors, among the rates of strains, in
+    """Write the velocities of nodes [m/s], shape (n_node, 3), and of raised directors, among the rates of strains, in
     the record of a fluid.
     """
     copy(velocity, fluid.node_velocity)

@@ -80,7 +80,7 @@ BENDING, TWISTING, BOND = map(slot_of, ("bending", "twisting", "bond"))
 
 @kernel
 def _force_on_frame(edge, p, q1, q2, q3, length, t, m1, m2, edge_gradient_out):
-    """First derivatives of Σ Q_α p·m_α with respect to one edge's (e, θ)."""
+    """Add the first derivatives of Σ Q_α p·m_α with respect to one edge's (e, θ)."""
     inverse = 1.0 / length
     pt = dot(p, t)
     v = combine(q1, m1, q2, m2)
@@ -90,7 +90,7 @@ def _force_on_frame(edge, p, q1, q2, q3, length, t, m1, m2, edge_gradient_out):
 
 @kernel
 def _curvature_on_frame(edge, pair, p, q1, q2, q3, length, t, m1, m2, edge_hessian_out, mixed_hessian_out):
-    """Second derivatives of Σ Q_α p·m_α with respect to one edge's (e, θ), and to p and these."""
+    """Add the second derivatives of Σ Q_α p·m_α with respect to one edge's (e, θ), and to p and these."""
     inverse = 1.0 / length
     pt = dot(p, t)
     v = combine(q1, m1, q2, m2)

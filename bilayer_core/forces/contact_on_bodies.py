@@ -22,7 +22,7 @@ from bilayer_core.model.records.problem import Problem
 
 @kernel
 def condense_contact(has_contact, bodies, sums):
-    """Nodes and free bodies take their share of contact."""
+    """Give nodes and free bodies their share of contact."""
     if not has_contact:
         return
     for i in range(sums.node.shape[0]):
@@ -77,7 +77,7 @@ def add_second_derivative(p, m, g, arm, lever, turning, i, r, a, b):
 
 @kernel
 def _skew(a, out):
-    """out = [a]×, shape (3, 3)."""
+    """Write out = [a]×, shape (3, 3)."""
     out[0, 0] = out[1, 1] = out[2, 2] = 0.0
     out[0, 1], out[0, 2], out[1, 2] = -a[2], a[1], -a[0]
     out[1, 0], out[2, 0], out[2, 1] = a[2], -a[1], a[0]

@@ -36,7 +36,9 @@ DRAG = slot_of("drag")
 
 @kernel
 def node_directions(before, after, at):
-    """Mean of the directions t, m1, m2 of the edges before and after a node (the same at an end), orthonormal."""
+    """Return the mean of the directions t, m1, m2 of the edges before and after a node (the same at an end),
+    orthonormal.
+    """
     return mixed_directions(before, 0.5, after, 0.5, at)
 
 

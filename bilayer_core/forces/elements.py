@@ -45,8 +45,8 @@ def strains_of_pair(strands, bonds, at, k):
 
 @kernel
 def measure_strains(p, at, strain_out):
-    """Strains of all elements: ε of edges, κ₁ − Σ b ε, κ₂ and ψ of joints, and p·m̄_α between layers; nothing without
-    viscosity.
+    """Write the strains of all elements: ε of edges, κ₁ − Σ b ε, κ₂ and ψ of joints, and p·m̄_α between layers; nothing
+    without viscosity.
 
     Shape (n_edge + 3 n_joint + 3 n_pair,) or (0,). Whole turns of ψ are those of `Configuration.joint_strain`.
     """

@@ -34,6 +34,6 @@ def across(axis: Sequence[float]) -> np.ndarray:
 
 
 def stiffness_of_joints(model: Model) -> tuple[float, float]:
-    """By default: force by distance [N/m], and moment by angle [N m]."""
+    """Return the default stiffness of joints: force by distance [N/m], and moment by angle [N m]."""
     edge = float((model.rods.axial_stiffness / model.rods.rest_length).max())
     return STIFFER * edge, STIFFER * float(model.rods.joint_stiffness.max())

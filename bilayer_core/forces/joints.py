@@ -67,7 +67,7 @@ class Joints:
 
 @kernel
 def _turned(rotation, b, local, k, out):
-    """R r of a body."""
+    """Write R r of a body."""
     for i in range(3):
         out[i] = rotation[b, i, 0] * local[k, 0] + rotation[b, i, 1] * local[k, 1] + rotation[b, i, 2] * local[k, 2]
 
@@ -84,7 +84,7 @@ def _add_turning(a, b, factor, out, row):
 
 @kernel
 def _add_point(stiffness, arms, g, hessian):
-    """Second derivatives of the distance of two points by (X_A, φ_A, X_B, φ_B), shape (12, 12)."""
+    """Add the second derivatives of the distance of two points by (X_A, φ_A, X_B, φ_B), shape (12, 12)."""
     jacobian = stack_matrix(3, 12)
     for s in range(2):
         sign, base = 1.0 - 2.0 * s, 6 * s

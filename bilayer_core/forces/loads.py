@@ -71,7 +71,7 @@ def _pull_of_levers(loads, raised, at, stage, pull_out):
 
 @kernel
 def in_axes_of_body(vector, k, factor, rotation, f, vector_out):
-    """Row k in the axes of free body f, times a factor."""
+    """Write row k in the axes of free body f, times a factor."""
     for c in range(3):
         vector_out[k, c] = 0.0
         for a in range(3):

@@ -182,7 +182,7 @@ def kinetic_energy_off_curve(raised, strands, velocity, rate):
 
 @kernel
 def pull_edges(raised, at, sums):
-    """Hand the pulls of raised edges on to their vectors and angles."""
+    """Add the pulls of raised edges to their vectors and angles."""
     for r in range(raised.edge.shape[0]):
         k, g = raised.edge[r], row(sums.pull, r)
         along = dot(g, row(at.tangent, k)) / at.length[k]

@@ -117,7 +117,7 @@ def measure_gaps(p, at, strain_out):
 
 @piece(float, Restitution, Problem, Configuration, Stage, bool)
 def add_restitution(_, p, at, stage, with_hessian):
-    """Nothing more: the loop of the barrier adds it (`forces.surface_barrier`)."""
+    """Add nothing: the loop of the barrier adds it (`forces.surface_barrier`)."""
     return math.inf
 
 

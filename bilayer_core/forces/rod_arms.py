@@ -108,7 +108,7 @@ def add_step_of_arm(surfaces, strands, i, k, rate, node_step, angle_step, out):
 
 @kernel
 def copy_rate(rate, k, rate_out, r):
-    """rate_out[r] = rate[k]"""
+    """Write rate_out[r] = rate[k]."""
     for c in range(3):
         for n in range(8):
             rate_out[r, c, n] = rate[k, c, n]

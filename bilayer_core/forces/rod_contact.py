@@ -69,7 +69,7 @@ ROD_BARRIER, ROD_FRICTION = map(slot_of, ("rod barrier", "rod friction"))
 
 @piece(bool, Problem, Matrix, Matrix, float, float, float)
 def list_near_rods(p, position, step, fraction, move, stray):
-    """Have a list of near pairs for a part of a step of rails from `position`, in which they move by `move` [m] and
+    """Make a list of near pairs for a part of a step of rails from `position`, in which they move by `move` [m] and
     stray by `stray` [m] from a straight way; false if there is no capacity for it.
     """
     rods = p.rod_contact

@@ -41,7 +41,7 @@ BARRIER = slot_of("barrier")
 
 @kernel
 def _in_world(axes, s, factor, h, m_out):
-    """Upper triangle of factor R h Rᵀ, h a symmetric matrix as (h₀₀, h₀₁, h₀₂, h₁₁, h₁₂, h₂₂)."""
+    """Write the upper triangle of factor R h Rᵀ, h a symmetric matrix as (h₀₀, h₀₁, h₀₂, h₁₁, h₁₂, h₂₂)."""
     for i in range(3):
         r0, r1, r2 = factor * axes[s, i, 0], factor * axes[s, i, 1], factor * axes[s, i, 2]
         v0 = r0 * h[0] + r1 * h[1] + r2 * h[2]

@@ -87,7 +87,7 @@ SAME_SECTION = 4
 
 @kernel
 def _forward(sliding, edges, start, on_rod, i, n0, n1, n2):
-    """Forward direction of a contact in its tangent plane, a unit vector.
+    """Return the forward direction of a contact in its tangent plane, a unit vector.
 
     That of the rod at a node (mean of its edges), any direction for a body. A rod whose direction is along the normal
     has no forward direction there: what rounding leaves of the projection decides.
@@ -123,8 +123,8 @@ def _tangential(x, y, z, n0, n1, n2):
 
 @kernel
 def _axis_of_grain(sliding, at, i, s, a, b):
-    """Forward direction for contact point i, on body a or −1, on surface s of body b: that of the surface's grain, or
-    of the grain that the point's own surface slides with, or of the world; a unit vector, or 0 without any.
+    """Return the forward direction for contact point i, on body a or −1, on surface s of body b: that of the surface's
+    grain, or of the grain that the point's own surface slides with, or of the world; a unit vector, or 0 without any.
     """
     x, y, z = row(sliding.surface_grain, s)
     if x != 0.0 or y != 0.0 or z != 0.0:
@@ -169,7 +169,7 @@ def _write_axis(sliding, surfaces, at, k, i, s, node, n):
 
 @kernel
 def _across(sliding, k, across_out):
-    """s = n × a"""
+    """Write s = n × a."""
     n, a = sliding.normal, sliding.axis
     across_out[0] = n[k, 1] * a[k, 2] - n[k, 2] * a[k, 1]
     across_out[1] = n[k, 2] * a[k, 0] - n[k, 0] * a[k, 2]
@@ -178,8 +178,8 @@ def _across(sliding, k, across_out):
 
 @kernel
 def _slip(sliding, surfaces, strands, at, stage, k, arm_out, lever_out, slip_out):
-    """Slip of a contact since the origin of the stage [m], and its arms now on the body that the contact point is on
-    (not written for a rod) and on that of the surface [m].
+    """Write the slip of a contact since the origin of the stage [m], and its arms now on the body that the contact
+    point is on (not written for a rod) and on that of the surface [m].
     """
     a, b, i = surfaces.contact_point_body[sliding.first[k]], surfaces.body[sliding.surface[k]], sliding.node[k]
     rotation, origin_rotation = sliding.rotation, sliding.origin_rotation
@@ -302,7 +302,7 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
 
 @kernel
 def _on_curve(surfaces, at, i, mix):
-    """Place of a rod's contact point without its arm [m]."""
+    """Return the place of a rod's contact point without its arm [m]."""
     return rod_point(surfaces, at, i, (mix[0], mix[1], 0.0, 0.0, 0.0, 0.0))
 
 
@@ -370,7 +370,7 @@ def _next_station(sliding, surfaces, strands, k, count):
 
 @kernel
 def _tangential_slip(sliding, p, at, stage, k, arm, lever, slip_out):
-    """Slip of a contact since the origin of the stage in its tangent plane [m]."""
+    """Write the slip of a contact since the origin of the stage in its tangent plane [m]."""
     _slip(sliding, p.surfaces, p.strands, at, stage, k, arm, lever, slip_out)
     n = sliding.normal
     along = slip_out[0] * n[k, 0] + slip_out[1] * n[k, 1] + slip_out[2] * n[k, 2]
@@ -404,7 +404,7 @@ def _share(surfaces, i, e):
 
 @kernel
 def _spread(sliding, p, at, stage, count):
-    """Spread contacts of stations over edges in which slip has turned round; returns the number of all contacts.
+    """Spread contacts of stations over edges in which slip has turned round, and return the number of all contacts.
 
     What an edge takes is its share of the station's whole load, whatever the edge before it took.
     """
@@ -462,7 +462,7 @@ def _add_place(sliding, surfaces, at, k, j, near, part, arm, count):
 
 @kernel
 def _relax(sliding, same):
-    """Aitken's acceleration of normal forces that were frozen anew."""
+    """Relax normal forces that were frozen anew, by Aitken's acceleration."""
     before, relaxation, product, square = sliding.relaxation[0], 1.0, 0.0, 0.0
     count, load, last, change = sliding.count[0], sliding.load, sliding.last_load, sliding.change
     if same and before > 0.0:

@@ -148,7 +148,7 @@ class _Worker(threading.Thread):
         self._ended = False
 
     def run(self) -> None:
-        """Have the process compile until nothing is left or something fails; `done` takes each name, or the failure."""
+        """Let the process compile until nothing is left or something fails; `done` takes each name, or the failure."""
         path = os.pathsep.join([str(PACKAGES), *filter(None, [os.environ.get("PYTHONPATH")])])
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", WORKER],  # -P: not what has the package's name in the present folder

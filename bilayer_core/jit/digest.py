@@ -175,7 +175,7 @@ def _record_text(declared: type[Record]) -> bytes:
 
 
 def _options(kernel: Kernel) -> Iterator[tuple[str, str]]:
-    """Options of numba, with those that are sets in an order."""
+    """Yield the options of numba, with those that are sets in an order."""
     for name, option in kernel.options.items():
         yield name, str(sorted(option) if isinstance(option, set) else option)
 

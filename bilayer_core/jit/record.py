@@ -148,7 +148,7 @@ class Record:
         self._lie_in(np.array(words, dtype=np.int64))
 
     def _hold(self, values: dict[str, Any]) -> None:
-        """Have the values as attributes; they are those of all fields."""
+        """Take the values of all fields as attributes."""
         fields = self.layout().fields
         if values.keys() != fields.keys():
             wrong = ", ".join(sorted(values.keys() ^ fields.keys()))
@@ -294,7 +294,7 @@ class _Block:
 
 @lru_cache(maxsize=1024)  # some thirty classes of records in a model of given sizes
 def _block(declared: type[Record], names: tuple[str, ...], sizes: tuple[int, ...]) -> _Block:
-    """For fields that declare a shape, with the sizes that `_sizes_in` names."""
+    """Return the block of fields that declare a shape, with the sizes that `_sizes_in` names."""
     return _Block(declared, shapes_of(declared, dict(zip(_sizes_in(declared, names), sizes, strict=True)), names))
 
 

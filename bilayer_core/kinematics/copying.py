@@ -8,7 +8,7 @@ from bilayer_core.jit.called import flat
 
 @kernel
 def copy(source, target):
-    """target = source, for contiguous arrays."""
+    """Write target = source, for contiguous arrays."""
     a, b = flat(source), flat(target)
     for i in range(a.shape[0]):
         b[i] = a[i]
@@ -16,7 +16,7 @@ def copy(source, target):
 
 @kernel
 def add_scaled(target, factor, source):
-    """target += factor source, for contiguous arrays."""
+    """Add factor × source to target, for contiguous arrays."""
     a, b = flat(source), flat(target)
     for i in range(a.shape[0]):
         b[i] += factor * a[i]
@@ -24,14 +24,14 @@ def add_scaled(target, factor, source):
 
 @kernel
 def copy_row(source, i, target, j):
-    """target[j] = source[i], for rows of three."""
+    """Write target[j] = source[i], for rows of three."""
     for c in range(3):
         target[j, c] = source[i, c]
 
 
 @kernel
 def copy_matrix(source, i, target, j):
-    """target[j] = source[i], for 3 × 3 matrices."""
+    """Write target[j] = source[i], for 3 × 3 matrices."""
     for c in range(3):
         for k in range(3):
             target[j, c, k] = source[i, c, k]

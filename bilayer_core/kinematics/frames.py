@@ -17,7 +17,7 @@ from bilayer_core.jit import kernel
 
 @kernel
 def edge_geometry(position, edge_node, length_out, tangent_out):
-    """Length [m] and unit tangent of every edge.
+    """Write the length [m] and the unit tangent of every edge.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def edge_geometry(position, edge_node, length_out, tangent_out):
 
 @kernel
 def planar_frames(position, edge_node, normal, side, length_out, tangent_out, director1_out, director2_out):
-    """Length [m] and material frame of every edge of rods in a plane: m1 = σ normal × t, m2 = σ normal.
+    """Write the length [m] and the material frame of every edge of rods in a plane: m1 = σ normal × t, m2 = σ normal.
 
     Parameters are those of `edge_geometry`, the unit normal of the plane, shape (3,), and σ = ±1 of each edge.
     """

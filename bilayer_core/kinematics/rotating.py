@@ -15,7 +15,8 @@ quaternion_of = kernel(rotation.quaternion_of)
 
 @kernel
 def rotate_by(v0, v1, v2, matrix, b, out, c):
-    """out[c] = exp([v]×) matrix[b] for a rotation vector v [rad], by Rodrigues' formula; `out[c]` is not `matrix[b]`.
+    """Write out[c] = exp([v]×) matrix[b] for a rotation vector v [rad] by Rodrigues' formula; `out[c]` is not
+    `matrix[b]`.
 
     Column by column: exp([v]×) u = u + s v × u + k v × (v × u).
     """
@@ -55,7 +56,8 @@ def rotation_vector_between(first, a, last, b):
 
 @kernel
 def compose_quaternion(v0, v1, v2, turned, out, f):
-    """out[f] = vector part of the unit quaternion of exp([v]×) after that of turned[f]; they may be the same array.
+    """Write the vector part of the unit quaternion of exp([v]×) after that of turned[f] to out[f]; they may be the same
+    array.
 
     Of turns by less than half a turn, whose quaternions have a positive real part. Small turns keep all their digits,
     which a matrix next to the unit matrix does not.
@@ -115,7 +117,7 @@ def spin_of(v0, v1, v2, u0, u1, u2):
 
 @kernel
 def product_transposed(left, a, right, b, out, c):
-    """out[c] = left[a] right[b]ᵀ"""
+    """Write out[c] = left[a] right[b]ᵀ."""
     for i in range(3):
         for j in range(3):
             out[c, i, j] = (
@@ -125,7 +127,9 @@ def product_transposed(left, a, right, b, out, c):
 
 @kernel
 def inertia_tensor(second_moment, f, rotation, b, out):
-    """R (tr(J) 1 − J) Rᵀ in the world's axes [kg m²], J the second moment of free body f, R = rotation[b]; (3, 3)."""
+    """Write R (tr(J) 1 − J) Rᵀ in the world's axes [kg m²], J the second moment of free body f, R = rotation[b]; (3,
+    3).
+    """
     trace = second_moment[f, 0, 0] + second_moment[f, 1, 1] + second_moment[f, 2, 2]
     for i in range(3):
         for j in range(3):

@@ -12,7 +12,7 @@ SMALL_ANGLE = 0.05
 
 @kernel
 def row(array, k):
-    """Row k of an (n, ≥3) array as a tuple."""
+    """Return row k of an (n, ≥3) array as a tuple."""
     return array[k, 0], array[k, 1], array[k, 2]
 
 
@@ -30,7 +30,9 @@ def cross(a, b):
 
 @kernel
 def angle(cosine, sine):
-    """Angle of the direction (cosine, sine) from (1, 0) [rad], −π to π: `math.atan2`, faster where it is small."""
+    """Return the angle of the direction (cosine, sine) from (1, 0) [rad], −π to π: `math.atan2`, faster where it is
+    small.
+    """
     if abs(sine) < SMALL_ANGLE * cosine:
         x = sine / cosine
         y = x * x
@@ -58,7 +60,7 @@ def combine3(s, a, t, b, r, c):
 
 @kernel
 def add_row(array, k, s, a):
-    """array[k, :3] += s a"""
+    """Add s a to array[k, :3]."""
     array[k, 0] += s * a[0]
     array[k, 1] += s * a[1]
     array[k, 2] += s * a[2]
@@ -66,7 +68,7 @@ def add_row(array, k, s, a):
 
 @kernel
 def add_column(array, k, column, s, a):
-    """array[k, :3, column] += s a"""
+    """Add s a to array[k, :3, column]."""
     array[k, 0, column] += s * a[0]
     array[k, 1, column] += s * a[1]
     array[k, 2, column] += s * a[2]
@@ -74,7 +76,7 @@ def add_column(array, k, column, s, a):
 
 @kernel
 def add_outer(array, k, s, a, b):
-    """array[k, :3, :3] += s a bᵀ"""
+    """Add s a bᵀ to array[k, :3, :3]."""
     for j in range(3):
         sb = s * (b[0] if j == 0 else (b[1] if j == 1 else b[2]))
         array[k, 0, j] += sb * a[0]
@@ -84,7 +86,7 @@ def add_outer(array, k, s, a, b):
 
 @kernel
 def add_identity(array, k, s):
-    """array[k, :3, :3] += s I"""
+    """Add s I to array[k, :3, :3]."""
     array[k, 0, 0] += s
     array[k, 1, 1] += s
     array[k, 2, 2] += s
@@ -92,7 +94,7 @@ def add_identity(array, k, s):
 
 @kernel
 def add_upper_outer(array, k, s, a):
-    """Upper triangle of array[k, :3, :3] += s a aᵀ"""
+    """Add s a aᵀ to the upper triangle of array[k, :3, :3]."""
     t0, t1 = s * a[0], s * a[1]
     array[k, 0, 0] += t0 * a[0]
     array[k, 0, 1] += t0 * a[1]
@@ -104,7 +106,7 @@ def add_upper_outer(array, k, s, a):
 
 @kernel
 def add_upper_symmetric(array, k, s, a, b):
-    """Upper triangle of array[k, :3, :3] += s (a bᵀ + b aᵀ)"""
+    """Add s (a bᵀ + b aᵀ) to the upper triangle of array[k, :3, :3]."""
     array[k, 0, 0] += 2.0 * s * a[0] * b[0]
     array[k, 0, 1] += s * (a[0] * b[1] + b[0] * a[1])
     array[k, 0, 2] += s * (a[0] * b[2] + b[0] * a[2])
@@ -115,14 +117,14 @@ def add_upper_symmetric(array, k, s, a, b):
 
 @kernel
 def add_upper_projector(array, k, s, a):
-    """Upper triangle of array[k, :3, :3] += s (I − a aᵀ), a a unit vector"""
+    """Add s (I − a aᵀ) to the upper triangle of array[k, :3, :3], a a unit vector."""
     add_identity(array, k, s)
     add_upper_outer(array, k, -s, a)
 
 
 @kernel
 def add_upper_outer_sum(array, k, s, a, x, b, y, c, z):
-    """Upper triangle of array[k, :3, :3] += s (a xᵀ + b yᵀ + c zᵀ), a sum that is symmetric"""
+    """Add s (a xᵀ + b yᵀ + c zᵀ), a sum that is symmetric, to the upper triangle of array[k, :3, :3]."""
     array[k, 0, 0] += s * (a[0] * x[0] + b[0] * y[0] + c[0] * z[0])
     array[k, 0, 1] += s * (a[0] * x[1] + b[0] * y[1] + c[0] * z[1])
     array[k, 0, 2] += s * (a[0] * x[2] + b[0] * y[2] + c[0] * z[2])
@@ -133,7 +135,7 @@ def add_upper_outer_sum(array, k, s, a, x, b, y, c, z):
 
 @kernel
 def add_outer_sum(array, k, s, a, x, b, y):
-    """array[k, :3, :3] += s (a xᵀ + b yᵀ)"""
+    """Add s (a xᵀ + b yᵀ) to array[k, :3, :3]."""
     for j in range(3):
         xj, yj = (x[0], y[0]) if j == 0 else ((x[1], y[1]) if j == 1 else (x[2], y[2]))
         array[k, 0, j] += s * (a[0] * xj + b[0] * yj)

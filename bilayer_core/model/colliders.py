@@ -93,7 +93,7 @@ class ContactPair:
 
 
 def contact_pairs(scene: SceneConfig, dimension: int = 3) -> tuple[ContactPair, ...]:
-    """Which parts of a scene can meet, each with how it is resolved in a dimension."""
+    """Return which parts of a scene can meet, each with how it is resolved in a dimension."""
     return scene.keep(("contact pairs", dimension), (), lambda: _contact_pairs(scene, dimension))
 
 
@@ -132,7 +132,7 @@ def _is_ribbon(rod: Rod) -> bool:
 
 
 def _points_of_rods(scene: SceneConfig, dimension: int, kind: str) -> str:
-    """Which points of rods meet a surface, and what a plane leaves out."""
+    """Return which points of rods meet a surface, and what a plane leaves out."""
     along = "nodes" if kind == "plane" else "points along rods"
     if not any(is_ribbon(rod) for rod in scene.rods):
         return f"{along} against {kind}"

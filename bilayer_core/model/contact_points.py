@@ -200,7 +200,7 @@ def _distinct(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _grain(surface: Surface | Obstacle | None) -> np.ndarray:
-    """In the frame of the body or the obstacle, 0 without one, shape (3,)."""
+    """Return the grain in the frame of the body or the obstacle, 0 without one, shape (3,)."""
     return np.zeros(3) if surface is None or surface.grain is None else np.array(surface.grain)
 
 
@@ -238,8 +238,8 @@ def _nodes_can_collide(
     held_by: np.ndarray,
     clear: float,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which nodes meet which surfaces, and which would if no body held them, shape (n_node, n_surface); their points
-    with arms meet the same.
+    """Return which nodes meet which surfaces, and which would if no body held them, shape (n_node, n_surface); their
+    points with arms meet the same.
 
     A node that a body holds does not meet the body's own surface, nor do its neighbours along the strand up to the
     first that is clear of the barrier: a rod may grow out of a body.

@@ -92,5 +92,5 @@ def _number(content: Any) -> int:
 
 
 def difference(saved: Array, own: Array) -> str:
-    """Which parts are not the same, as text; empty if all are."""
+    """Return which parts are not the same, as text; empty if all are."""
     return ", ".join(name for name, a, b in zip(FIXED.values(), saved, own, strict=True) if a != b)

@@ -54,7 +54,7 @@ class Question:
         return any(rod_pair.active for rod_pair in self.rod_pairs)
 
     def loads(self, frame: str) -> list[Load]:
-        """Those that are fixed in the frame of the world, or of the material."""
+        """Return the loads that are fixed in the frame of the world, or of the material."""
         return [load for load in self.scene.loads if load.frame == frame]
 
 

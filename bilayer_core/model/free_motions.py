@@ -54,7 +54,7 @@ class Mechanism:
 
 
 def mechanisms_of(scene: SceneConfig) -> tuple[Mechanism, ...]:
-    """Those of joints, then those of guided bodies; of each first its turn."""
+    """Return the mechanisms of joints, then those of guided bodies; of each first its turn."""
     found = []
     for joint in scene.joints:
         found += [Mechanism(joint.name, *joint.bodies, joint.point, joint.axis, law) for law in _laws(joint)]

@@ -93,8 +93,8 @@ def _shares(spans: list[Span], layers: Array) -> tuple[Array, Array]:
 
 
 def _add_drag(found: Collected, fluid: config.Fluid, rod: Rod, copies: list[list[Span]]) -> None:
-    """Drag of the whole section at each station, shared by its layers in proportion to their thickness: it acts at
-    the middle.
+    """Add the drag of the whole section at each station, shared by its layers in proportion to their thickness: it acts
+    at the middle.
     """
     length = np.full(stations_of(rod)[1] + 1, rod.edge_length)
     length[[0, -1]] *= 0.0 if rod.closed else 0.5

@@ -89,7 +89,9 @@ def reason_of_stiffness(model: Model) -> dict[str, str]:
 
 
 def _approaching(model: Model) -> Iterator[tuple[str, float, float, float]]:
-    """Name, mass [kg], length of contact [m] and speed towards the nearest plane of free bodies and rods [m/s]."""
+    """Return the name, mass [kg], length of contact [m] and speed towards the nearest plane of free bodies and rods
+    [m/s].
+    """
     bodies, free, points, start = model.bodies, model.free_bodies, model.surfaces, initial_state(model)
     if not model.has_surface_contact:
         return

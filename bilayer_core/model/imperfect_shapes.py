@@ -77,7 +77,7 @@ def _modes(rod: Rod, x: Array) -> tuple[Array, Array]:
 
 
 def advice(scene: SceneConfig) -> Iterator[Finding]:
-    """Rods whose buckling is left to rounding, each with what to declare."""
+    """Yield the rods whose buckling is left to rounding, each with what to declare."""
     for scene_rod in scene.rods:
         for copy in scene_rod.copies if scene_rod.imperfection is None else ():
             reason, rod = _symmetry(scene, copy), copy.rod

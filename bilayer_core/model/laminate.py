@@ -61,7 +61,7 @@ class _Placed:
         return self.present * self.section.mass * self.length
 
     def spin_inertia(self, centre: Array) -> Array:
-        """About a line at a height over the path [kg m²]."""
+        """Return the moment of inertia about a line at a height over the path [kg m²]."""
         return self.present * self.length * self.section.spin_inertia + self.mass * (self.height - centre) ** 2
 
 
@@ -193,7 +193,7 @@ def _axis(layers: list[_Placed]) -> float:
 
 
 def _prevailing(present: Array) -> Array:
-    """On which edges those layers are that most edges have, by which of them each has, shape (n_layer, n_edge)."""
+    """Return which edges have the most frequent set of layers; shape (n_edge,), of `present` (n_layer, n_edge)."""
     kind = (1 << np.arange(len(present))[::-1]) @ present  # a bit for each layer
     count = np.bincount(kind).tolist()
     return kind == max(range(len(count)), key=lambda k: (count[k], k.bit_count()))
@@ -241,8 +241,8 @@ def _faces(rod: Rod, axis: float) -> tuple[Array, Array]:
 def _drawn_layers(
     copy: RodCopy, axis: float, at: tuple[int, int], thickness: Array, width: Array, curvature: Array
 ) -> tuple[StrandArrays, ...]:
-    """Each layer on those nodes of a laminate's strand where it is: its first node and edge, thicknesses of layers
-    [m], shape (n_layer, n_node), width [m] and curvature [1/m] of the strand, shape (n_node,).
+    """Return each layer on those nodes of a laminate's strand where it is: its first node and edge, thicknesses of
+    layers [m], shape (n_layer, n_node), width [m] and curvature [1/m] of the strand, shape (n_node,).
     """
     rod, layers = copy.rod, []
     for slot, layer in enumerate(rod.layers):
@@ -268,7 +268,7 @@ def _drawn_layers(
 
 
 def uneven_faces(rod: Rod, scene: SceneConfig) -> Iterator[Figure]:
-    """Where contact of a rod with rods counts from a face that is not where the nearer one is."""
+    """Yield the rods for which contact with rods counts from a face that is not where the nearer one is."""
     rod = rod.copies[0].rod  # whose layers are those of all
     low, high = _faces(rod, _axis_of(scene, rod))
     difference = np.abs(high + low)

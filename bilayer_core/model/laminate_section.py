@@ -269,8 +269,8 @@ class WholeSection:
         return pairs
 
     def driven(self, layer: LayerCells, driven: Array) -> tuple[Array, Array]:
-        """Per eigenstrain of a layer in some cells, shape (n_cell,): rest strains N*/A* of all edges, shape (n_copy,
-        n_edge), and κ̄₁ of all nodes, −Σ ℓ M/D [rad], shape (n_copy, n_node).
+        """Return what an eigenstrain of a layer in some cells, shape (n_cell,), gives: rest strains N*/A* of all edges,
+        shape (n_copy, n_edge), and κ̄₁ of all nodes, −Σ ℓ M/D [rad], shape (n_copy, n_node).
         """
         axial = driven * layer.axial * np.ones_like(layer.ratio)
         force, moment = self._loads(axial, -axial * layer.height)

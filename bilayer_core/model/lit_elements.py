@@ -126,8 +126,8 @@ def shine(light, end):
 
 
 def part_seen(light: Light, position: Array, director1: Array, body_position: Array, body_rotation: Array) -> Array:
-    """Part of its stimulus that each law sees of a robot at some positions and frames: 1 where that is no light, shape
-    (n_law,).
+    """Return the part of its stimulus that each law sees of a robot at some positions and frames: 1 where that is no
+    light, shape (n_law,).
     """
     light.node_position[:], light.director1[:] = position, director1
     light.body_position[:-1], light.body_rotation[:-1] = body_position, body_rotation

@@ -118,7 +118,7 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
 
 
 def _warnings_of(scene: SceneConfig, model: str, dimension: int) -> Iterator[Figure]:
-    """Warnings that depend on the model."""
+    """Yield the warnings that depend on the model."""
     yield from (figure for figure in twist_figures(scene, model, dimension) if figure.outside)
     yield from redundant_joints(scene, require_plane(scene) if dimension == 2 else None)
     if model == "two_rod":
@@ -183,7 +183,7 @@ def _choose(key: str, asked, of_scene, allowed: tuple) -> tuple | None:
 
 
 def _contact_pairs(scene: SceneConfig, dimension: int) -> tuple[str, ...]:
-    """Which surfaces can meet and how; many of one kind on one line."""
+    """Return which surfaces can meet and how; many of one kind on one line."""
     pairs = [
         *contact_pairs(scene, dimension),
         *(

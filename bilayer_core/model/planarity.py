@@ -63,7 +63,7 @@ def _frames(copy: RodCopy, arc: Array) -> tuple[Array, Array, Array]:
 
 
 def _plane_of(copy: RodCopy) -> Plane:
-    """Plane of the path and normal of a rod."""
+    """Return the plane of the path and normal of a rod."""
     point, p, q = (part[0] for part in _frames(copy, np.zeros(1)))
     normal = cross(p[None], q[None])[0]
     axis = int(np.argmax(np.abs(normal)))
@@ -130,7 +130,7 @@ class _Survey:
                 yield f"obstacles.{obstacle.name} is not symmetric about {plane}"
 
     def _vectors(self) -> Iterator[str]:
-        """Keys of rods, directions and motions that leave the plane."""
+        """Yield the keys of rods, directions and motions that leave the plane."""
         scene = self._scene
         for rod in scene.rods:
             for copy in rod.copies:
@@ -168,7 +168,7 @@ class _Survey:
                 yield f"loads.{load.name}.moment"
 
     def _friction_axes(self) -> Iterator[tuple[str, Array]]:
-        """Directions by which friction differs, in the world at the start."""
+        """Yield the directions by which friction differs, in the world at the start."""
         scene = self._scene
         law = scene.contact.friction if scene.contact is not None else None
         if law is not None and law.axis is not None:
@@ -181,7 +181,7 @@ class _Survey:
                 yield f"obstacles.{obstacle.name}.grain", obstacle_pose(obstacle)[1] @ np.array(obstacle.grain)
 
     def _motions(self, body: Body) -> Iterator[str]:
-        """Keys of a body's motion that leave the plane."""
+        """Yield the keys of a body's motion that leave the plane."""
         motion = body.motion
         if isinstance(motion, Prescribed):
             if not self._lies_in(*motion.displacements):
@@ -221,7 +221,9 @@ class _Survey:
             yield "motion.inertia, of which no principal axis is along its normal,"
 
     def _of_load(self, load) -> tuple[Array, Array]:
-        """Force and moment of a load in the world's axes at the start, but that of a rod in the axes of the first."""
+        """Return the force and moment of a load in the world's axes at the start, but that of a rod in the axes of the
+        first.
+        """
         force, moment = np.array(load.force), np.array(load.moment)
         if load.frame == "world":
             return force, moment

@@ -119,7 +119,9 @@ def _point_forces(name: str, found: Collected, raised: np.ndarray, on_nodes: lis
 
 
 def _copies(scene: SceneConfig, found: Collected, name: str) -> Iterator[tuple[Rod, list[Span], float]]:
-    """Rods of a name, or the copies of a pattern, each with its strands and the height of its path over these [m]."""
+    """Yield the rods of a name, or the copies of a pattern, each with its strands and the height of its path over these
+    [m].
+    """
     spans = iter(zip(found.rods, found.path_height, strict=True))
     for rod in scene.rods:
         for copy in rod.copy_names:

@@ -78,8 +78,8 @@ class _Constraints:
         return _rank(np.hstack([self.rows[number][:, part] @ self._motions for part in parts]))
 
     def velocities(self, scene: SceneConfig) -> tuple[float, Array]:
-        """When the first prescribed motion begins [s], infinity if none does, and in which proportion bodies move then,
-        shape (6 n_body,).
+        """Return when the first prescribed motion begins [s], infinity if none does, and in which proportion bodies
+        move then, shape (6 n_body,).
         """
         begins = [_first_motion(body, self._length) for body in scene.bodies]
         start = min((begin for begin, _ in begins), default=np.inf)
@@ -107,8 +107,8 @@ def _rank(rows: Array) -> int:
 
 
 def _first_motion(body: Body, length: float) -> tuple[float, Array]:
-    """When a body begins to move, infinity if it never does, and its velocity and angular velocity just after, but for
-    a factor that all bodies share.
+    """Return when a body begins to move, infinity if it never does, and its velocity and angular velocity just after,
+    but for a factor that all bodies share.
     """
     motion = body.motion
     if isinstance(motion, Prescribed):
@@ -124,7 +124,7 @@ def _first_motion(body: Body, length: float) -> tuple[float, Array]:
 
 
 def redundant_joints(scene: SceneConfig, plane: Plane | None) -> Iterator[Finding]:
-    """Joints that hold what joints before them, or guides, hold already; `plane` is that of dimension 2."""
+    """Yield the joints that hold what joints before them, or guides, hold already; `plane` is that of dimension 2."""
     if not scene.joints:
         return
     constraints, owners = _Constraints(scene, plane), []

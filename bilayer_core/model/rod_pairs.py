@@ -77,7 +77,7 @@ def _rod_pairs(scene: SceneConfig) -> tuple[RodPair, ...]:
 
 
 def passing_warnings(scene: SceneConfig) -> Iterator[Finding]:
-    """Warnings of rods that could meet, but would pass through each other."""
+    """Yield the warnings of rods that could meet, but would pass through each other."""
     for rod_pair in rod_pairs(scene):
         if rod_pair.possible and not rod_pair.active:
             yield Finding(

@@ -211,7 +211,7 @@ class NearPairs:
         return len(self.search.point)
 
     def reserve(self, capacity: int) -> None:
-        """Have capacity for so many pairs, none of which is listed then."""
+        """Make room for so many pairs, none of which is listed then."""
         kept = {name: getattr(self.search, name) for name in ("base", "tip", "box", "sweep", "met")}
         self.search = self.search.allocated({"near pair": capacity}, **kept)
 

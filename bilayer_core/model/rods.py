@@ -196,7 +196,7 @@ def _driven(rod: Rod, layer: Layer, law: Eigenstrain, strand: StrandArrays) -> t
 
 
 def _add_bond(found: Collected, scene: SceneConfig, rod: Rod, bottom: _Bonded, top: _Bonded) -> None:
-    """Bonds of paired edges; the rest values are those of the initial shape."""
+    """Add the bonds of paired edges; the rest values are those of the initial shape."""
     first, last = max(bottom.first, top.first), min(bottom.last, top.last, rod.stations - 1)
     (_, below), (_, above) = (_sections(scene, rod, layer, first, last) for layer in rod.layers)
     law = bond(below, above, scene.coupling, rod.torsion)
@@ -239,7 +239,8 @@ def _add_bond(found: Collected, scene: SceneConfig, rod: Rod, bottom: _Bonded, t
 def _add_end(
     found: Collected, pair: tuple[_Bonded, _Bonded], slot: int, station: int, bond: int, distance: float, side: float
 ) -> None:
-    """Bending and twist of a layer in the half edges at a station where it or the other one ends (`forces.bond`).
+    """Add the bending and twist of a layer in the half edges at a station where it or the other one ends
+    (`forces.bond`).
 
     Parameters
     ----------

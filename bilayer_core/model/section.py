@@ -68,9 +68,9 @@ def sections(rod: Rod, layer: Layer, material: Material, stations: Array) -> Sec
 
 
 def outline(rod: Rod, stations: Array) -> tuple[Array, Array]:
-    """Width of a rod and thickness of its layers [m] at stations, which may be whole numbers or lie between; shapes
-    (n_place,) and (n_layer, n_place). Thickness is 0 where a layer is not: at stations outside those nearest to its
-    interval, and between two that it covers no part of.
+    """Return the width of a rod and the thickness of its layers [m] at stations, which may be whole numbers or lie
+    between; shapes (n_place,) and (n_layer, n_place). Thickness is 0 where a layer is not: at stations outside those
+    nearest to its interval, and between two that it covers no part of.
     """
     stations = rod.on_path(stations)
     along, edges = rod.edge_length * stations, np.floor(stations)
@@ -118,7 +118,7 @@ class Bond:
 
 
 def bond(bottom: Section, top: Section, multiples: Coupling, torsion: str) -> Bond:
-    """Bond of two sections whose centrelines are c = (h₁ + h₂)/2 apart.
+    """Return the bond of two sections whose centrelines are c = (h₁ + h₂)/2 apart.
 
     k_T = 10 EA_r/c², k_b = 10 EA_r, k_τ = 10 min(GJ)/c² with the default multiples, EA_r = EA₁EA₂/(EA₁ + EA₂): the
     error of the penalty is below 0.04 %, and curvature gradients do not lock. For ``torsion: laminate``

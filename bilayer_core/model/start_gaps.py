@@ -53,7 +53,7 @@ class SurfaceGaps:
 
 
 def surface_gaps(model: Model, within: float) -> Iterator[SurfaceGaps]:
-    """Yield of each surface the contact points that it meets and that are nearer than `within` [m]."""
+    """Yield, for each surface, the contact points that it meets and that are nearer than `within` [m]."""
     surfaces, bodies, position = model.surfaces, model.bodies, start_contact_points(model)
     base = np.concatenate([bodies.start_position, np.zeros((1, 3))])[surfaces.body]
     rotation = np.concatenate([bodies.start_rotation, np.eye(3)[None]])[surfaces.body]

@@ -78,7 +78,7 @@ class State:
     fingerprint: Array  # of the scene it belongs to, shape (n_part,), or (0,) for a state that is never saved
 
     def __post_init__(self):
-        """Have the parts, which are copied, in one piece."""
+        """Copy the parts into one piece."""
         parts = [getattr(self, name) for name in PARTS]
         self.values = np.concatenate([part.ravel() for part in parts])
         start = 0
@@ -103,7 +103,7 @@ class State:
         return sealed(self.values, self.place_of_seal)
 
     def layout(self) -> tuple[tuple[str, tuple[int, ...]], ...]:
-        """Name and shape of each part of `flat`."""
+        """Return the name and shape of each part of `flat`."""
         return tuple((name, getattr(self, name).shape) for name in PARTS)
 
     def set_flat(self, flat: Array) -> bool:
@@ -216,7 +216,7 @@ def initial_state(
     memory: int = 0,
     conditions: float = 0.0,
 ) -> State:
-    """State at time 0: the scene's shape, with the velocities of `model.start_motion`.
+    """Return the state at time 0: the scene's shape, with the velocities of `model.start_motion`.
 
     Materials have reached the stimulus from before time 0: a schedule that jumps there acts from the first step on.
     `with_history` makes arrays for what some integrators keep from step to step, `memory` for so many values of forces;

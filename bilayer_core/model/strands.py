@@ -170,7 +170,7 @@ def _edges(positions: Array, closed: bool) -> tuple[Array, Array]:
 
 
 def _imperfect_frames(rod: Rod, arc: Array) -> tuple[Array, Array, Array]:
-    """Those of the path with the imperfection: points x + f n + g t×n."""
+    """Return the frames of the path with the imperfection: points x + f n + g t×n."""
     points, tangents, normals = rod.frames_at(arc)
     (f, g), slopes = (part.T[..., None] for part in departure(rod, arc))
     along = _tangents_beside(rod, arc, tangents, normals, (f, g), slopes)

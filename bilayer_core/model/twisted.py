@@ -53,7 +53,7 @@ STRETCH = 0.05
 
 
 def twist_figures(scene: SceneConfig, model: str, dimension: int) -> Iterator[Figure]:
-    """Figures of rods that twist, as they are computed."""
+    """Yield the figures of rods that twist, as they are computed."""
     variants = [variant for scene_rod in scene.rods for variant in scene_rod.variants]
     for rod in variants if dimension == 3 else ():
         natural, wound = _naturally_twisted(rod), _on_twisted_path(rod)
@@ -69,7 +69,7 @@ def twist_figures(scene: SceneConfig, model: str, dimension: int) -> Iterator[Fi
 
 
 def helix_error(scene: SceneConfig, rod: Rod) -> float:
-    """Part by which `laminate` misses radius or pitch of a rod that natural twist or its path winds up."""
+    """Return the part by which `laminate` misses radius or pitch of a rod that natural twist or its path winds up."""
     return max(TwistedRod(scene, rod).helix_errors()) if _naturally_twisted(rod) or _on_twisted_path(rod) else 0.0
 
 
@@ -171,7 +171,7 @@ class TwistedRod:
         return self._middle - (axial * self._middle).sum(axis=0) / axial.sum(axis=0)
 
     def held_back(self, two_rods: bool) -> float:
-        """Part of the twist that clamps hold back and the model does not."""
+        """Return the part of the twist that clamps hold back and the model does not."""
         axial, bend = self._plane_strain * self._axial, self._plane_strain * self._bend
         bending = (bend + axial * self._over_axis(axial) ** 2).sum(axis=0)
         squares = self._width**2, self._height**2

@@ -74,7 +74,7 @@ def validity_warnings(scene: SceneConfig) -> Iterator[Figure]:
 
 
 def validity_figures(scene: SceneConfig) -> Iterator[Figure]:
-    """All figures of a scene on which the validity of the model depends."""
+    """Yield all figures of a scene on which the validity of the model depends."""
     thinnest = {}
     for rod in scene.rods:
         at_edges = edge_figures(scene, rod)

@@ -39,7 +39,7 @@ def stencil_rows(surfaces, strands, i, rows_out):
 
 @kernel
 def stencil_jacobian(axes, rate, r, jacobian_out):
-    """∂y by the unknowns of a stencil, from the rate r, shape (3, 11)."""
+    """Write ∂y by the unknowns of a stencil, from the rate r, shape (3, 11)."""
     dimension = axes.shape[0]
     for c in range(3):
         for m in range(dimension):

@@ -50,7 +50,7 @@ def assemble_in_space(p, factor):
 
 @kernel
 def _add_nodes(strands, sums, factor, band):
-    """Factor × mass, and the blocks of single nodes (contact, drag) by their upper triangles."""
+    """Add factor × mass, and the blocks of single nodes (contact, drag) by their upper triangles."""
     hessian = sums.node_hessian
     for i in range(strands.row.shape[0]):
         d = strands.row[i]
@@ -63,7 +63,7 @@ def _add_nodes(strands, sums, factor, band):
 
 @kernel
 def _add_edges(strands, sums, factor, band):
-    """Blocks of edges, by their upper triangles, and factor × moment of inertia."""
+    """Add the blocks of edges, by their upper triangles, and factor × moment of inertia."""
     hessian = sums.edge_hessian
     for k in range(strands.edge_node.shape[0]):
         i, t = strands.edge_node[k], strands.edge_unknown[k]
@@ -82,7 +82,7 @@ def _add_edges(strands, sums, factor, band):
 
 @kernel
 def _add_bends(strands, hessian, band):
-    """Cross blocks of bending elements, of rows (e_a, θ_a) and columns (e_b, θ_b); those of clamps have none."""
+    """Add cross blocks of bending elements, of rows (e_a, θ_a) and columns (e_b, θ_b); those of clamps have none."""
     for k in range(strands.bend_count):
         a, b = strands.joint_a[k], strands.joint_b[k]
         if a >= strands.edge_count or b >= strands.edge_count:
@@ -107,13 +107,13 @@ def _add_bends(strands, hessian, band):
 
 @kernel
 def add(band, row, column, value):
-    """A[row, column] += value in either triangle."""
+    """Add a value to A[row, column] in either triangle."""
     band[min(row, column), abs(row - column)] += value
 
 
 @kernel
 def _add_bonds(space, strands, sums, band):
-    """Blocks of bonds of paired edges.
+    """Add the blocks of bonds of paired edges.
 
     The unknowns of a bond are consecutive: x_b0, x_t0, θ_b, θ_t of one station and x_b1, x_t1 of the next
     (`model.unknown_order`). Their local matrix is collected first, its lower triangle then added.
@@ -159,13 +159,13 @@ def _add_bonds(space, strands, sums, band):
 
 @kernel
 def add_twice(band, row, column, value):
-    """A[row, column] += value and A[column, row] += value."""
+    """Add a value to A[row, column] and to A[column, row]."""
     band[min(row, column), abs(row - column)] += value if row != column else 2.0 * value
 
 
 @kernel
 def _add_ends(bonds, space, strands, sums, band):
-    """Blocks of section vectors where a layer ends, x_t − x_b; `_add_bends` has those of two edges."""
+    """Add the blocks of section vectors where a layer ends, x_t − x_b; `_add_bends` has those of two edges."""
     of_pairs = sums.pair_hessian
     for k in range(strands.joint_a.shape[0] - strands.bend_count, bonds.joint.shape[0]):
         x = bonds.joint[k]
@@ -183,7 +183,7 @@ def _add_ends(bonds, space, strands, sums, band):
 
 @kernel
 def _add_section_with_edge(strands, k, mixed, edge, top, bottom, band):
-    """Blocks of a section vector, by rows of its two nodes, and an edge."""
+    """Add the blocks of a section vector, by rows of its two nodes, and an edge."""
     i, turn = strands.edge_node[edge], strands.edge_unknown[edge]
     d0, d1 = strands.row[i], strands.row[i + 1]
     for m in range(3):

@@ -152,7 +152,9 @@ def condense_clamp_edges(attachments, strands, at, sums, border):
 
 @kernel
 def condense_clamp_edges_in_plane(attachments, plane, strands, at, border):
-    """`condense_clamp_edges` in a plane, where the angle of a clamp edge is that of its body about the normal."""
+    """Do the same as `condense_clamp_edges` in a plane, where the angle of a clamp edge is that of its body about the
+    normal.
+    """
     normal, frame, values, scratch = plane.normal, plane.frame, stack_matrix(4, 3), stack_matrix(3, 6)
     for k in range(attachments.clamp_edge_free.shape[0]):
         f, w, x = attachments.clamp_edge_free[k], strands.edge_count + k, attachments.clamp_edge_joint[k]

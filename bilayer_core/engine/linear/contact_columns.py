@@ -82,7 +82,7 @@ def _list_contacts(columns, rails, rate, strands, simplified, contacts):
 
 @kernel
 def _subtract(matrix, factor, v0, v1, v2):
-    """matrix −= factor v vᵀ"""
+    """Subtract factor v vᵀ from a matrix."""
     v = (v0, v1, v2)
     for m in range(3):
         for n in range(3):

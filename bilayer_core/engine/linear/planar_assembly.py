@@ -33,7 +33,7 @@ def assemble_in_plane(p, at, factor):
 
 @kernel
 def _node_block(axes, node_hessian, mass, i):
-    """Block (pp, pq, qq) of a node by itself: its mass, and what acts on it in space, by an upper triangle."""
+    """Return the block (pp, pq, qq) of one node: its mass and what acts on it in space, by an upper triangle."""
     if node_hessian.shape[0] == 0:
         return mass, 0.0, mass
     p, q = row(axes, 0), row(axes, 1)

@@ -49,7 +49,7 @@ def _declare(called: Called) -> None:
 
 
 def _declaration_of_piece(piece: CalledByName) -> tuple[Callable, Callable]:
-    """Have the code at the address in its slot called, with the declared types."""
+    """Call the code at the address in its slot, with the declared types."""
     parameters, symbol = inspect.signature(piece.function), slot_of(piece.name)
     declared = signature_of(piece)
     binding.add_symbol(symbol, ctypes.addressof(piece.slot))

@@ -36,7 +36,7 @@ define void @numba_gil_release(ptr %state) {
 
 
 def set_target() -> None:
-    """Have numba compile for the target: it takes this when it compiles its first function, and optimises for it."""
+    """Let numba compile for the target: it takes this when it compiles its first function, and optimises for it."""
     numba.config.reload_config()  # which would undo this if it came later, after a change of the environment
     numba.config.CPU_NAME, numba.config.CPU_FEATURES = target()
 
