@@ -113,5 +113,5 @@ class SimulationError(BilayerError):
         self.remedy = remedy
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """For its way between processes."""
+        """Reduce the error to what makes it again in another process."""
         return type(self), (self.reason, self.time, self.remedy)

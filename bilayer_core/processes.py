@@ -83,7 +83,7 @@ def _nothing() -> None:
 
 
 def _begin(prepare: Callable[[], None] | None) -> None:
-    """In each of the processes: end when the one that started it has ended, though it could not say so."""
+    """End this process, one of a pool, when the one that started it has ended, though it could not say so."""
 
     def watch() -> None:
         parent_process().join()

@@ -162,7 +162,7 @@ def _vector(components) -> str:
 
 
 def _own_laws(pattern) -> str:
-    """By what the eigenstrains of copies differ."""
+    """Return by what the eigenstrains of copies differ."""
     from bilayer_core.model.findings import few
 
     told = [f"{name} is {few(channels, 4)}" for name, channels in pattern.stimuli.items()]

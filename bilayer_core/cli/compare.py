@@ -23,7 +23,7 @@ class Compare(Verb):
     """Takes ``--json`` without a value too, as earlier releases did."""
 
     def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
-        """Give it the value that it meant."""
+        """Give ``--json`` without a value the one that it meant."""
         arguments = list(args)
         for place, argument in enumerate(arguments):
             following = arguments[place + 1 : place + 2]

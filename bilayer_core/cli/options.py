@@ -50,7 +50,7 @@ class Verb(click.Command):
         self._old_spellings = old_spellings or {}
 
     def parse_args(self, context: click.Context, args: list[str]) -> list[str]:
-        """Understand old spellings, up to ``--``."""
+        """Replace old spellings, up to ``--``."""
         args = list(args)
         for place, argument in enumerate(args):
             if argument == "--":

@@ -72,8 +72,9 @@ for verb in (*SIMULATES, *MANY, *OF_LOGS):
 
 @contextmanager
 def _seldom_collected() -> Iterator[None]:
-    """Little time for the garbage collector. At the end of the process, which frees all memory anyway, it takes none:
-    there it went through all objects several times, which took as long as a third of a warm start.
+    """Leave little time to the garbage collector while this lasts. At the end of the process, which frees all memory
+    anyway, it takes none: there it went through all objects several times, which took as long as a third of a warm
+    start.
     """
     before = gc.get_threshold()
     gc.set_threshold(OBJECTS_BETWEEN_COLLECTIONS, *before[1:])

@@ -8,7 +8,7 @@ from typing import Any
 
 
 def choices(report: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Names of what was chosen for a scene, and what that is, with the reasons."""
+    """Yield the names of what was chosen for a scene, and what that is, with the reasons."""
     for key, reason in report["reasons"].items():
         chosen = report[key]
         yield key.replace("_", " "), f"{f'{chosen:.0e} Pa' if isinstance(chosen, float) else chosen} ({reason})"
@@ -69,7 +69,7 @@ def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
 
 
 def _motions(name: str, part: dict) -> Iterator[str]:
-    """How far a hinge, a rail or a joint has turned and slid, where something resists that."""
+    """Yield a line for each hinge, rail or joint where something resists its motion: how far it has turned or slid."""
     for key, word, unit, factor in (("turning", "turned", "deg", 180.0 / math.pi), ("sliding", "slid", "mm", 1e3)):
         if key in part:
             beyond = part.get(f"{key}_beyond_limit", 0.0)

@@ -228,7 +228,7 @@ def _simulate(
     quiet: bool,
     judge: _Judge | None,
 ) -> BilayerError | None:
-    """Run; what stopped the simulation, if anything did, is returned, for the outputs to be completed first."""
+    """Run, and return what stopped the simulation, if anything did, for the outputs to be completed first."""
     begin = simulator.time
     try:
         with interrupt, progress_bar(simulator.scene.name, begin, begin + duration, quiet) as show:

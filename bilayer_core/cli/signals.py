@@ -152,7 +152,7 @@ class Signals:
             pass  # as in `heed`
 
     def _take_unraisable(self, what: sys.UnraisableHookArgs) -> None:
-        """Python goes on where an exception is raised in a destructor or in a callback from C."""
+        """End the process if an interruption was raised where Python goes on: in a destructor or a callback from C."""
         if what.exc_type is Interruption:
             self._end_at_once()
         self._hook(what)
@@ -169,7 +169,7 @@ def _handle_by(handler: Any) -> None:
 
 
 def _tell(interruption: Interruption) -> None:
-    """Past Python's buffers, which may be in use where a signal comes."""
+    """Write the interruption to standard error past Python's buffers, which may be in use where a signal comes."""
     try:
         os.write(STANDARD_ERROR, f"bilayer: {interruption}\n".encode())
     except OSError:

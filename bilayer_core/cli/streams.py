@@ -28,7 +28,7 @@ class _Stream(io.FileIO):
 
 
 def guard_streams() -> None:
-    """Have output that cannot be written raise OutputError, and messages that cannot be written be lost quietly.
+    """Let output that cannot be written raise OutputError, and lose messages that cannot be written quietly.
 
     A reader that goes away raises BrokenPipeError, as ever. Descriptors that are closed are taken, so that no file
     which is opened later gets one and with it what other code prints.

@@ -34,7 +34,7 @@ def machine() -> dict[str, str]:
 
 @cache
 def _processor() -> str:
-    """Name of the processor's model, as far as the system tells it."""
+    """Return the name of the processor's model, as far as the system tells it."""
     from llvmlite import binding
 
     return str(binding.get_host_cpu_name())

@@ -38,7 +38,7 @@ class Varied:
 
     @classmethod
     def read(cls, text: str) -> Varied:
-        """From ``NAME=FROM:TO:COUNT``, evenly from one value to another.
+        """Read ``NAME=FROM:TO:COUNT``: values evenly from one to another.
 
         Raises
         ------

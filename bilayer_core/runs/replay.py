@@ -318,7 +318,7 @@ def refuse_without_inputs(path: Path) -> None:
 
 
 def _events(path: Path) -> Iterator[Array | Input]:
-    """States, as flat arrays, and inputs in the order in which they came."""
+    """Yield states, as flat arrays, and inputs in the order in which they came."""
     size = sum(math.prod(shape) for _, shape in read_head(path).description.state_layout)
     inputs = 0
     for topic, _, time, data in read_messages(path, {STATE, INPUTS.full_name()}):
@@ -411,7 +411,7 @@ class _Comparison:
         return Difference(float(logged[0]), int(logged[1]), name, where, float(one[index]), float(other[index]))
 
     def _owner(self, name: str, shape: tuple[int, ...], row: int) -> str:
-        """Which node, edge, body or channel a row of a part is of."""
+        """Return which node, edge, body or channel a row of a part is of."""
         description = self._description
         nodes = max(s.nodes.stop for s in description.strands) if description.strands else 0
         if name.startswith("body_") and shape[0] == len(description.bodies):

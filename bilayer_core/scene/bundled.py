@@ -20,7 +20,7 @@ SUFFIXES = (SUFFIX, ".yml")
 
 
 def _candidates() -> Iterator[Path]:
-    """Directories below which scenes and templates may be, the likeliest first."""
+    """Yield the directories below which scenes and templates may be, the likeliest first."""
     # A checkout, an editable install, a colcon symlink install: the package is a link into the checkout.
     beside = Path(os.path.realpath(bilayer_core.__file__)).parents[1]
     yield beside / "config"
@@ -33,7 +33,7 @@ def _candidates() -> Iterator[Path]:
 
 
 def _recorded() -> Iterator[Path]:
-    """Where the installer says that it put them (``pip install --user``, ``--prefix``)."""
+    """Yield where the installer says that it put them (``pip install --user``, ``--prefix``)."""
     from importlib.metadata import PackageNotFoundError, files
 
     try:

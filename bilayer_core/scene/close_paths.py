@@ -21,7 +21,7 @@ class Rod(Protocol):
     closed: bool
 
     def frames_at(self, arc: np.ndarray) -> Frames:
-        """Points [m], tangents and normals at lengths `arc` [m] along the path."""
+        """Return the points [m], tangents and normals at lengths `arc` [m] along the path."""
         ...
 
 

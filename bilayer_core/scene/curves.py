@@ -71,17 +71,17 @@ class Curve(ABC):
 
     @abstractmethod
     def carried(self, normal: Array, arc: Array) -> tuple[Array, Array, Array]:
-        """Points [m], tangents and normals at lengths `arc` [m] from the start, shapes (n, 3); the normals do not
-        twist.
+        """Return the points [m], tangents and normals at lengths `arc` [m] from the start, shapes (n, 3); the normals
+        do not twist.
         """
 
     @abstractmethod
     def bend(self, arc: Array, over: float) -> Array:
-        """t′ there [1/m], shape (n, 3); of corners the mean `over` a length [m]."""
+        """Return t′ there [1/m], shape (n, 3); of corners the mean `over` a length [m]."""
 
     @abstractmethod
     def angle(self, arc: Array, derivative: int = 0) -> Array:
-        """Angle from carried normals [rad] there, where points have normals; or its derivative."""
+        """Return the angle from carried normals [rad] there, where points have normals; or its derivative."""
 
     @cached_property
     def angles(self) -> Array:
@@ -167,7 +167,7 @@ class Polyline(Curve):
         return points, tangents, normals
 
     def angle(self, arc: Array, derivative: int = 0) -> Array:
-        """Angle from carried normals [rad], or its derivative."""
+        """Return the angle from carried normals [rad], or its derivative."""
         if derivative == 0:
             return np.interp(arc, self.knots, self.angles)
         return (np.diff(self.angles) / np.diff(self.knots))[self._segment(arc)]
@@ -253,7 +253,7 @@ class Spline(Curve):
         return float(self.angles[-1] - self.angles[0]) / self.knots[-1] if self.closed else 0.0
 
     def angle(self, arc: Array, derivative: int = 0) -> Array:
-        """Angle from carried normals [rad], or its derivative."""
+        """Return the angle from carried normals [rad], or its derivative."""
         return self._turning(arc, derivative) + self._ramp * (arc if derivative == 0 else 1.0)
 
     def bend(self, arc: Array, over: float) -> Array:

@@ -123,7 +123,7 @@ def _demand(fault: ErrorDetails) -> str:
 
 
 def key_path(location: Location, data: Any) -> str:
-    """Key path as a user writes it, such as ``rods.arm.layers.active.thickness`` or ``gravity[2]``.
+    """Return the key path as a user writes it, such as ``rods.arm.layers.active.thickness`` or ``gravity[2]``.
 
     pydantic puts the chosen type of a union into its location, given or by default; that is not a key of the file and
     is left out.
@@ -235,7 +235,7 @@ def _expected(schema: type[BaseModel], location: Location) -> str:
 
 
 def repeated(named: list[tuple[Location, str]], among: str) -> Iterator[Fault]:
-    """Names that occur twice."""
+    """Yield a fault for each name that occurs twice."""
     seen: set[str] = set()
     for where, name in named:
         if name in seen:

@@ -28,7 +28,7 @@ def notes(model: type[BaseModel]) -> dict[str, str]:
 
 
 def _own_notes(model: type[BaseModel]) -> Iterator[tuple[str, str]]:
-    """Name of each field, and the string that stands below it."""
+    """Return the name of each field, and the string that stands below it."""
     body = ast.parse(textwrap.dedent(inspect.getsource(model))).body[0].body
     for field, text in zip(body, body[1:], strict=False):
         is_field = isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name)

@@ -90,7 +90,7 @@ def _choice(model: type[BaseModel]) -> str:
 
 
 def _places() -> dict[type[BaseModel], list[str]]:
-    """Key paths at which each class may stand; a class inside itself is not followed."""
+    """Return the key paths at which each class may stand; a class inside itself is not followed."""
     places: dict[type[BaseModel], list[str]] = {}
 
     def visit(model: type[BaseModel], path: str, around: tuple[type[BaseModel], ...]) -> None:

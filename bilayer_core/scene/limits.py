@@ -44,7 +44,7 @@ class Rods(Protocol):
 
 
 def read_text(path: Path, largest: int) -> str:
-    """Text of a regular file in UTF-8, with or without a byte order mark.
+    """Return the text of a regular file in UTF-8, with or without a byte order mark.
 
     Raises
     ------

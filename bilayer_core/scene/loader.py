@@ -50,7 +50,7 @@ def load_scene(scene: str | Path | Mapping[str, Any], overrides: Overrides = ())
 
 
 def read_scene_file(path: Path) -> str:
-    """Text of a scene file. SceneError if it cannot be read."""
+    """Return the text of a scene file. SceneError if it cannot be read."""
     try:
         return read_text(path, LARGEST_FILE)
     except ValueError as error:

@@ -103,7 +103,7 @@ def resistance(*laws: Turning | Sliding | None) -> str:
 
 
 def _faults(law: Turning | Sliding, rest: str) -> Iterator[Fault]:
-    """Keys that need another, and limits that leave no room."""
+    """Yield the faults of keys that need another, and of limits that leave no room."""
     if law.spring == 0.0 and getattr(law, rest) != 0.0:
         yield (rest,), getattr(law, rest), "must be left out: there is no `spring`"
     if law.limits is None:

@@ -16,7 +16,7 @@ _NAME_LINE = re.compile(r"^name:[ \t]*[^\s#]+", re.MULTILINE)
 
 
 def templates() -> dict[str, str]:
-    """Title of each template by its name."""
+    """Return the title of each template by its name."""
     return {
         name: read_yaml(path.read_text(encoding="utf-8"), str(path))["title"]
         for name, path in bundled_templates().items()
@@ -24,14 +24,14 @@ def templates() -> dict[str, str]:
 
 
 def name_from(path: Path) -> str:
-    """Name of a scene that is written to `path`: its stem, made fit for topics and key paths."""
+    """Return the name of a scene that is written to `path`: its stem, made fit for topics and key paths."""
     words = re.findall(r"[A-Za-z0-9]+", path.stem)
     name = "_".join(words) or "robot"
     return name if name[0].isalpha() else f"robot_{name}"
 
 
 def new_scene(path: Path, template: str = DEFAULT_TEMPLATE, origin: str | None = None) -> str:
-    """Text of a scene that is to be written to `path`, comments included; it loads without faults.
+    """Return the text of a scene that is to be written to `path`, comments included; it loads without faults.
 
     Parameters
     ----------

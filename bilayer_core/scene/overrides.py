@@ -90,7 +90,7 @@ def _override(path: str, value: Any, text: str) -> Override:
 
 
 def _place(here: Any, key: str) -> str | int | None:
-    """Key or index of an item that is there, else None."""
+    """Return the key or index of an item that is there, else None."""
     if isinstance(here, dict):
         return key if key in here else None
     if not isinstance(here, list):

@@ -36,11 +36,11 @@ class Path(Part):
 
     @abstractmethod
     def frames_at(self, normal: Array, arc: Array) -> Frames:
-        """Frames at lengths `arc` [m] from the start, where the rod's normal is `normal`."""
+        """Return the frames at lengths `arc` [m] from the start, where the rod's normal is `normal`."""
 
     @abstractmethod
     def curvatures_at(self, normal: Array, arc: Array, over: float) -> Array:
-        """χ, ξ, τ [1/m] there, shape (n, 3). Corners have a mean `over` a length [m] alone."""
+        """Return χ, ξ, τ [1/m] there, shape (n, 3). Corners have a mean `over` a length [m] alone."""
 
     @property
     def is_closed(self) -> bool:
@@ -61,7 +61,7 @@ class Path(Part):
         return "radius"
 
     def describe(self) -> str:
-        """Its shape in words; empty for a straight one."""
+        """Describe the shape in words; empty for a straight one."""
         return ""
 
 
@@ -159,7 +159,7 @@ class ArcPath(Path):
         return _along_normal(np.full(len(arc), _side(self.toward) / self.radius))
 
     def describe(self) -> str:
-        """Its shape in words."""
+        """Describe the shape in words."""
         return f"arc of radius {1e3 * self.radius:.4g} mm over {math.degrees(self.angle):.4g}°"
 
 
@@ -263,7 +263,7 @@ class SpiralPath(Path):
         return "start_radius" if arc == 0.0 else "end_radius"
 
     def describe(self) -> str:
-        """Its shape in words."""
+        """Describe the shape in words."""
         radii = f"{1e3 * self.start_radius:.4g} to {1e3 * self.end_radius:.4g} mm"
         return f"spiral of radius {radii} over {math.degrees(self.angle):.4g}°"
 
@@ -351,7 +351,7 @@ class HelixPath(Path):
         return _demand_perpendicular(normal, self.axis, "the axis of the helix")
 
     def describe(self) -> str:
-        """Its shape in words."""
+        """Describe the shape in words."""
         size = f"radius {1e3 * self.radius:.4g} mm, pitch {1e3 * self.pitch:.4g} mm"
         return f"{self.handedness}-handed helix of {size}, {self.angle / (2.0 * math.pi):.4g} turns"
 

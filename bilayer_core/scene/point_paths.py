@@ -122,7 +122,7 @@ class PointPath(Path):
         return "points"
 
     def describe(self) -> str:
-        """Its shape in words."""
+        """Describe the shape in words."""
         normals = "" if self.normals is None else " with normals"
         closed = "closed " if self.closed else ""
         return f"{closed}{self.shape} through {self.own_points} points{normals}"
@@ -234,5 +234,5 @@ def _rounded(vector: Array) -> str:
 
 
 def _angle_between(first: Array, second: Array) -> float:
-    """Angle of two unit vectors [rad]."""
+    """Return the angle of two unit vectors [rad]."""
     return 2.0 * math.atan2(float(np.linalg.norm(first - second)), float(np.linalg.norm(first + second)))

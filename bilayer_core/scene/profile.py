@@ -24,7 +24,7 @@ class Profile(Part, Generic[Value]):
 
     @classmethod
     def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
-        """Title in the JSON Schema."""
+        """Return the title in the JSON Schema."""
         return f"Profile of {_quantity(params[0]).what}"
 
     @model_validator(mode="after")

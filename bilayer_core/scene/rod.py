@@ -198,7 +198,9 @@ class Rod(Part):
         return first, last
 
     def covered_parts(self, edges: np.ndarray, layer: Layer, law: Eigenstrain | None = None) -> np.ndarray:
-        """Part of each edge of the path that `layer` covers, or that a law of it drives, 0 … 1, shape (n_edge,)."""
+        """Return the part of each edge of the path that `layer` covers, or that a law of it drives, 0 … 1, shape
+        (n_edge,).
+        """
         first, last = self.span_of(layer, law)
         return np.clip(np.minimum(edges + 1.0, last) - np.maximum(edges, first), 0.0, 1.0)
 
@@ -232,7 +234,7 @@ LARGEST_IMPERFECTION = 0.1
 
 
 def faults_of_rod(rod: Rod) -> list[Fault]:
-    """Its normal, and where its layers begin and end."""
+    """Return the faults of a rod's normal, and of where its layers begin and end."""
     demand = rod.path.demand_of_normal(np.array(rod.normal))
     faults: list[Fault] = [(("normal",), rod.normal, demand)] if demand else []
     faults += _faults_of_closed(rod) if rod.closed else ()

@@ -51,7 +51,7 @@ class Ramp(Spans):
         return self
 
     def span(self, t: float) -> Span:
-        """Before, on, or after the ramp."""
+        """Return the span before, on, or after the ramp."""
         if t < self.start:
             return Span(self.start, self.from_value)
         if t < self.end:
@@ -79,7 +79,7 @@ class Table(Spans):
         return self
 
     def span(self, t: float) -> Span:
-        """Between two of the times, before the first, or after the last."""
+        """Return the span between two of the times, before the first, or after the last."""
         right = bisect_right(self.times, t)
         if right == 0:
             return Span(self.times[0], self.values[0])
@@ -115,7 +115,7 @@ class Sequence(Spans):
     """Whether it begins again after the last part."""
 
     def span(self, t: float) -> Span:
-        """One of the present part; the next part begins with a corner."""
+        """Return the span of the present part; the next part begins with a corner."""
         if t < 0.0:
             return Span(0.0, self.parts[0].schedule.value(0.0))
         total = sum(part.duration for part in self.parts)

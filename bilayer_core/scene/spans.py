@@ -52,7 +52,7 @@ class Span(NamedTuple):
     phase: float = 0.0
 
     def value(self, t: float) -> float:
-        """Value at time `t` [s]; at the end, where the schedule may jump, that from before."""
+        """Return the value at time `t` [s]; at the end, where the schedule may jump, that from before."""
         return value_of_span(t, *self[1:])
 
     def later(self, delay: float, until: float) -> Span:
@@ -76,7 +76,7 @@ class Spans(BaseModel):
         """Return the span that contains time `t` [s]; where two meet, the one that begins there."""
 
     def value(self, t: float) -> float:
-        """Value at time `t` [s], in the unit of the channel."""
+        """Return the value at time `t` [s], in the unit of the channel."""
         return self.span(t).value(t)
 
     def breakpoint_after(self, t: float) -> float:
@@ -84,7 +84,8 @@ class Spans(BaseModel):
         return self.span(t).until
 
     def value_before(self, t: float, h: float) -> float:
-        """Value at the end `t` [s] of a step of length `h` [s]: the limit from within the step where it jumps at `t`.
+        """Return the value at the end `t` [s] of a step of length `h` [s]: the limit from within the step where it
+        jumps at `t`.
 
         A step that ends at a jump has its own value to its end; the next one begins with the new value.
         """

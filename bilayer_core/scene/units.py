@@ -59,7 +59,8 @@ def _registry():
 
 
 def parse_quantity(text: str, unit: str) -> float:
-    """Value of a text such as ``1 mm`` in `unit` (``"1"``: dimensionless); a bare number is in `unit` already.
+    """Return the value of a text such as ``1 mm`` in `unit` (``"1"``: dimensionless); a bare number is in `unit`
+    already.
 
     Angles are a dimension of their own here: ``1 Hz`` is not ``1 rad/s`` and ``40 deg`` is not a plain number.
 

@@ -64,7 +64,7 @@ class Controls:
         self.note(LOAD, name, math.nan if factor is None else float(factor), float(over))
 
     def set_friction(self, value: float | None, key: str = "coefficient") -> None:
-        """Have a coefficient of friction jump from the next step on; see `Simulator.set_friction`."""
+        """Let a coefficient of friction jump from the next step on; see `Simulator.set_friction`."""
         if change_friction(self._stepper.model, self._state, value, key):
             self._stepper.restart(self._state)
             self._state.has_history.fill(0.0)  # accelerations jump
@@ -78,7 +78,7 @@ class Controls:
         *,
         over: float = LEAST_TIME,
     ) -> None:
-        """Have a prescribed body go to a pose from the next step on; see `Simulator.set_pose`."""
+        """Let a prescribed body go to a pose from the next step on; see `Simulator.set_pose`."""
         goal = new_goal(self._stepper.model, self._state, name, position, quaternion, over)
         if goal is not None:
             self._state.pose_goal[goal[0]] = goal[1]

@@ -50,7 +50,7 @@ class Motion:
     contact: Array
 
     def work(self, gradient: Gradient) -> float:
-        """Work [J] of forces with the given gradient over this displacement; power [W] if it is a velocity."""
+        """Return the work [J] of forces with a gradient over this displacement; power [W] if it is a velocity."""
         return -sum(float(np.vdot(getattr(gradient, part), getattr(self, part))) for part in PARTS)
 
 
@@ -64,7 +64,9 @@ def compose(model: Model, node: Array, turn: Array, clamp_edge: Array, contact: 
 
 
 def displacement(model: Model, start: Configuration, end: Configuration) -> Motion:
-    """From one configuration to another; turns, each by less than half a turn, are those beyond parallel transport."""
+    """Return the motion from one configuration to another; turns, each by less than half a turn, are those beyond
+    parallel transport.
+    """
     edges = model.rods.edge_count
     turn = _turn(start.tangent, start.director1, end.tangent, end.director1)
     clamp_edge = np.column_stack([end.tangent[edges:] - start.tangent[edges:], turn[edges:]])
@@ -100,7 +102,7 @@ def of_prescribed(model: Model, motion: Motion) -> Motion:
 
 
 def _turn(tangent: Array, director: Array, new_tangent: Array, new_director: Array) -> Array:
-    """Angle about the new tangent from the transported director to the new one [rad], shape (n,)."""
+    """Return the angle about the new tangent from the transported director to the new one [rad], shape (n,)."""
 
     def dot(u: Array, v: Array) -> Array:
         return np.einsum("ki,ki->k", u, v)

@@ -189,7 +189,9 @@ class EnergyLedger:
         before: _Instant,
         after: _Instant,
     ) -> Array:
-        """Work [J] of a barrier over each of the motions; `rates` are those at the start, in the middle, at the end."""
+        """Return the work [J] of a barrier over each of the motions; `rates` are those at the start, in the middle, at
+        the end.
+        """
 
         def rate(part: float) -> Array:
             _, gradient = self._force(name, way.at(part))
@@ -199,7 +201,7 @@ class EnergyLedger:
         return simpson(rate, (0.0, 1.0), tuple(rates), BARRIER_ERROR * energy, BARRIER_HALVINGS)
 
     def _work_of_fluid(self, before: _Instant, after: _Instant, imposed: Motion) -> float:
-        """Work [J] of the fluid's inertia, dP/dt − ∂T/∂q, on what prescribed bodies impose."""
+        """Return the work [J] of the fluid's inertia, dP/dt − ∂T/∂q, on what prescribed bodies impose."""
         held = self._imposed_mass > 0.0
         pushed = after.fluid.momentum[held] - before.fluid.momentum[held]
         turned = 0.5 * (before.fluid.shape_gradient + after.fluid.shape_gradient)

@@ -176,7 +176,7 @@ class _Search:
         self.growth_after_failure = CAREFUL_GROWTH if follows(model) else GROWTH
 
     def _drive(self, stepper: Stepper) -> None:
-        """Have the rest strains and the loads of now, and the light on the present shape, in a stepper."""
+        """Write the rest strains and the loads of now, and the light on the present shape, to a stepper."""
         state, model = self.state, self.stepper.model
         if len(state.transduction):
             settled = self.stepper.surroundings.stimulus_at(state, self.time, self.ended)[model.drives.law_channel]

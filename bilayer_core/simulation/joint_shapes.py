@@ -71,7 +71,7 @@ def _ball(radius: float, place: np.ndarray) -> ShapeInfo:
 
 
 def _rail(radius: float, place: np.ndarray, axis: np.ndarray, limits: tuple[float, float] | None) -> ShapeInfo:
-    """Between its limits, or of a usual length."""
+    """Return a rail between its limits, or of a usual length."""
     low, high = limits or (-0.5 * RAIL_LENGTH * radius, 0.5 * RAIL_LENGTH * radius)
     return _axle(RAIL_RADIUS * radius, high - low, place + 0.5 * (low + high) * axis, axis)
 

@@ -94,7 +94,7 @@ def positions_with_points(model: Model, state: State) -> Array:
 
 
 def velocities_with_points(model: Model, state: State) -> Array:
-    """Their velocities [m/s], shape (n_node + n_point, 3)."""
+    """Return the velocities of nodes, then of contact points of bodies [m/s], shape (n_node + n_point, 3)."""
     if not model.point_count:
         return state.velocity.copy()
     body, arms = _points(model, state)
@@ -119,6 +119,6 @@ def energies(model: Model, seen: Parts) -> dict[str, float]:
 
 @cache
 def _conservative(forces: tuple[str, ...]) -> tuple[tuple[str, int], ...]:
-    """Those of some forces, with their slots."""
+    """Return those of some forces that are conservative, with their slots."""
     kind = kinds()
     return tuple((name, slot_of(name)) for name in forces if kind[name] is Kind.CONSERVATIVE)

@@ -64,7 +64,7 @@ class PlaneWatch:
         self.restart(0.0)
 
     def take_scene(self, duration: float, take: Callable[[Stepper], None]) -> None:
-        """Have another scene of the same model, which `take` gives to a stepper."""
+        """Take another scene of the same model, which `take` gives to a stepper."""
         self._slowest = GROWTH / duration
         if self._space is not None:
             take(self._space)

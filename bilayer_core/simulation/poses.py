@@ -115,7 +115,7 @@ def new_goal(
 
 
 def _controlled_body(model: Model, name: str) -> tuple[int, int, Prescribed]:
-    """Index of a body, its index among the controlled ones, and its motion."""
+    """Return the index of a body, its index among the controlled ones, and its motion."""
     bodies, scene = model.bodies, model.scene
     if name not in bodies.names:
         known = ", ".join(bodies.names) or "none"

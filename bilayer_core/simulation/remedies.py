@@ -149,6 +149,6 @@ def _stiffness_that_holds(model: Model, speed: float) -> float:
 
 
 def _rounded_up(value: float) -> float:
-    """To one digit, not below."""
+    """Round up to one digit."""
     digit = 10.0 ** math.floor(math.log10(value))
     return math.ceil(value / digit) * digit

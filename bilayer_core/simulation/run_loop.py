@@ -134,7 +134,7 @@ class RunLoop:
         self._stepper.begin_budget(self._state)
 
     def compile(self) -> float:
-        """Have kernels and the forces of the first state ready; see `Simulator.compile`."""
+        """Prepare kernels and the forces of the first state; see `Simulator.compile`."""
         if self._compile_time is None:
             ensure_compiled(needed=partial(needed_pieces, self._stepper.model))
             begin = clock.thread_time()
@@ -146,7 +146,9 @@ class RunLoop:
 
     @contextmanager
     def timed(self) -> Iterator[None]:
-        """Count what is done meanwhile as time of the simulation, and the loading of kernels as that of compilation."""
+        """Count what is done while this lasts as time of the simulation, and the loading of kernels as that of
+        compilation.
+        """
         cpu, wall, loaded = clock.thread_time(), wall_time(), loading.cpu
         try:
             yield

@@ -19,8 +19,8 @@ CHOSEN = ("model", "dimension", "integrator")
 
 
 def differing(one: SceneConfig, other: SceneConfig) -> tuple[str, ...]:
-    """Key paths of what differs between the models of two scenes, at most down to an item of a list; empty if they are
-    the same.
+    """Return the key paths of what differs between the models of two scenes, at most down to an item of a list; empty
+    if they are the same.
     """
     return tuple(dict.fromkeys(_differing(one, other)))
 

@@ -371,7 +371,7 @@ class Simulator:
         self._controls.set_load(name, factor, over=over)
 
     def set_friction(self, value: float | None, key: str = "coefficient") -> None:
-        """Have a coefficient of friction jump to a value, from the next step on.
+        """Let a coefficient of friction jump to a value, from the next step on.
 
         Parameters
         ----------
@@ -397,7 +397,7 @@ class Simulator:
         *,
         over: float = LEAST_TIME,
     ) -> None:
-        """Have a prescribed body go to a pose from the next step on, and rest there; see `simulation.poses`.
+        """Let a prescribed body go to a pose from the next step on, and rest there; see `simulation.poses`.
 
         It gets there in the time `over`, or in the time that its `top_speed` and `top_angular_speed` demand if that is
         longer, with a continuous velocity from where and however fast it moves now. Its schedule acts no more, until

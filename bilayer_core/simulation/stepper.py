@@ -144,7 +144,7 @@ class Stepper:
         )
 
     def take_scene(self, scene: SceneConfig, steps: Steps, max_iterations: int) -> None:
-        """Have another scene of the same model (`simulation.same_model`), with its steps; nothing is built."""
+        """Take another scene of the same model (`simulation.same_model`), with its steps; nothing is built."""
         model = replace(self.model, scene=scene)
         control = self._control_of(model, steps)
         self.engine.take_scene(model, control, steps.newton_tolerance, max_iterations)

@@ -48,8 +48,8 @@ class Surroundings:
         self.actuation = self._spans_about(0.0)
 
     def stimulus_at(self, state: State, time: float, ended: float = 0.0) -> Array:
-        """Value of each channel at `time`, shape (n_channel,): that set from outside, or the schedule's; `ended` as for
-        `load_factor`.
+        """Return the value of each channel at `time`, shape (n_channel,): that set from outside, or the schedule's;
+        `ended` as for `load_factor`.
         """
         scheduled = [channel.value_before(time, ended) if ended else channel.value(time) for channel in self._channels]
         return _overridden(scheduled, state.override[: len(scheduled)], time)
@@ -67,7 +67,7 @@ class Surroundings:
         return float(np.concatenate([self.stimulus_at(state, float(state.time[0])), self.load_factor(state)])[index])
 
     def cover(self, time: float, override: Array, pose_goal: Array) -> None:
-        """Have `actuation` hold what acts from `time` [s] on, and a little before, where something may jump.
+        """Let `actuation` hold what acts from `time` [s] on, and a little before, where something may jump.
 
         Parameters
         ----------

@@ -97,7 +97,7 @@ def summary(branches: Sequence[Branch], name: str) -> str:
 
 
 def _send_rods(recording: rr.RecordingStream, under: str, run: RunData, colour: np.ndarray) -> None:
-    """All strands of a run as lines."""
+    """Send all strands of a run as lines."""
     recording.log(
         f"{under}/rods", rr.LineStrips3D.from_fields(colors=colour, radii=rr.Radius.ui_points(LINE_WIDTH)), static=True
     )

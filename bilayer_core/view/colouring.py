@@ -114,8 +114,8 @@ def _values(run: RunData, layer: Strand, quantity: str) -> np.ndarray:
 
 
 def contact_pressure(run: RunData, layer: Strand) -> np.ndarray:
-    """Size of the contact force on each node, friction included, over the face of the ribbon that is the node's: its
-    width times half the way to both neighbours [Pa], shape (shapes, nodes).
+    """Return the size of the contact force on each node, friction included, over the face of the ribbon that is the
+    node's: its width times half the way to both neighbours [Pa], shape (shapes, nodes).
     """
     positions = run.positions[:, layer.nodes].astype(float)
     edges = np.linalg.norm(np.diff(positions, axis=1), axis=2)

@@ -170,7 +170,7 @@ def shape_mesh(shape: ShapeInfo, colours: Colours) -> Mesh:
 
 
 def _round_patches(radius: float, half_length: float, rounding: float, segments: int = 8, steps: int = 6):
-    """Segments round the axis z, like those of a beach ball: points and normals, shapes (rows, steps + 1, 3)."""
+    """Yield segments round the axis z, like those of a beach ball: points and normals, shapes (rows, steps + 1, 3)."""
     polar = np.linspace(0.0, np.pi, 2 * ARC_STEPS + 1)
     polar = np.concatenate([[0.0], polar[: ARC_STEPS + 1], polar[ARC_STEPS:], [np.pi]])
     flat = np.concatenate([[0.0], np.full(2 * ARC_STEPS + 2, radius), [0.0]])  # ends begin at the axis
@@ -185,7 +185,7 @@ def _round_patches(radius: float, half_length: float, rounding: float, segments:
 
 
 def _box_patches(core: np.ndarray, rounding: float):
-    """Faces of a box with their share of its rounded edges: points and normals, shapes (rows, columns, 3)."""
+    """Yield the faces of a box with their share of its rounded edges: points and normals, shapes (rows, columns, 3)."""
     quarter = np.linspace(0.0, 0.25 * np.pi, ARC_STEPS // 2 + 1)
     slopes = np.tan(np.concatenate([-quarter[::-1], quarter]))
     signs = np.repeat([-1.0, 1.0], len(quarter))

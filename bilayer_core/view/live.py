@@ -51,7 +51,7 @@ class LiveView:
         self._arranged = ""
 
     def begin(self, description: Description) -> None:
-        """From now on messages are those of another run."""
+        """Begin a run: from now on messages are those of another one."""
         self.close()
         self._number += 1
         self._arriving = ArrivingRun(description)

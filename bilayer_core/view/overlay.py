@@ -70,7 +70,7 @@ class Overlay:
         drawing.text(at, text, theme.text, font, anchor, stroke_width=halo, stroke_fill=theme.halo)
 
     def _draw_colour_bar(self, drawing: ImageDraw.ImageDraw, colouring: Colouring) -> int:
-        """At the lower left; its right end [pixels]."""
+        """Draw the colour bar at the lower left, and return its right end [pixels]."""
         width, height = self._legend.size
         text, left = self._text, 2 * self._margin
         length = round(min(max(BAR_SHARE * width, BAR_TEXT * text), 0.5 * width))
@@ -87,7 +87,7 @@ class Overlay:
         return left + length + 2 * text
 
     def _draw_scale_bar(self, drawing: ImageDraw.ImageDraw, metres_per_pixel: float) -> int:
-        """At the lower right; its left end [pixels]."""
+        """Draw the scale bar at the lower right, and return its left end [pixels]."""
         width, height = self._legend.size
         metres, label = round_length(SCALE_SHARE * width * metres_per_pixel)
         length, text = metres / metres_per_pixel, self._text
@@ -108,7 +108,7 @@ class Overlay:
 
 
 def text_size_of(height: int) -> int:
-    """Size of text in a picture of a height [pixels]."""
+    """Return the size of text in a picture of a height [pixels]."""
     return int(min(max(TEXT_SHARE * height, LEAST_TEXT), MOST_TEXT))
 
 

@@ -309,7 +309,7 @@ def _run(log: str | Path) -> RunData:
 
 
 def _split(asked: str, run: RunData) -> tuple[str, str]:
-    """Name and component of what is asked for."""
+    """Return the name and component of what is asked for."""
     if asked in run.entries():
         return asked, ""
     name, dot, component = asked.rpartition(".")

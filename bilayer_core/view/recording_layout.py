@@ -114,14 +114,14 @@ class Curves:
 
     @classmethod
     def between(cls, begin: float, end: float) -> Curves:
-        """Those of a run that is over, by the times of its first and last frame [s]."""
+        """Return the curves of a run that is over, by the times of its first and last frame [s]."""
         moment = rr.TimeRangeBoundary.absolute
         room = LEGEND_ROOM * (end - begin) or 1.0
         return cls(rr.TimeRange(start=moment(seconds=begin), end=moment(seconds=end + room)))
 
     @classmethod
     def until_now(cls, length: float) -> Curves:
-        """Those of a run that goes on: of the last `length` [s] up to the time that is shown."""
+        """Return the curves of a run that goes on: of the last `length` [s] up to the time that is shown."""
         boundary = rr.TimeRangeBoundary
         ahead = boundary.cursor_relative(seconds=LEGEND_ROOM * length)
         return cls(

@@ -58,7 +58,7 @@ class Look:
 
     @classmethod
     def of(cls, camera: str = AUTO, background: str = "dark", **others: object) -> Look:
-        """From the words of the command line; InputError if one is not known."""
+        """Read a look from the words of the command line; InputError if one is not known."""
         return cls(parse_camera(camera), theme_of(background), **others)
 
 
@@ -250,7 +250,7 @@ class _Setting:
 
 
 def _aspect_of(camera: Camera, found: list[Shot], every: list[np.ndarray], robot: list[np.ndarray]) -> float:
-    """Width over height of what is seen of the points that the camera holds, as far as pictures are so wide."""
+    """Return width over height of what is seen of the points that the camera holds, as far as pictures are so wide."""
     axes, follows = camera.axes, len({tuple(shot.eye) for shot in found}) > 1
     spans = []
     for shot, points in zip(found, robot if follows else every, strict=True):

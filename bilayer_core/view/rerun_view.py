@@ -97,7 +97,7 @@ def open_browser(path: str | Path, say: Callable[[str], None], colour: str = STR
 
 
 def screenshot(path: str | Path, png_path: str | Path, time: float | None = None, colour: str = STRAIN) -> None:
-    """Picture of an ``.rrd`` or ``.mcap`` file at `time` [s] (default: the end), made without a screen.
+    """Write a picture of an ``.rrd`` or ``.mcap`` file at `time` [s] (default: the end), made without a screen.
 
     Raises InputError naming the missing Debian packages when there is no Vulkan driver.
     """

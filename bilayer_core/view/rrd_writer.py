@@ -139,7 +139,7 @@ class RunSender:
         self._send_events(run)
 
     def _send_strands(self, run: RunData, colouring: Colouring) -> None:
-        """Layers as ribbons, or where their cross-sections are not known, their nodes as points."""
+        """Send layers as ribbons, or where their cross-sections are not known, their nodes as points."""
         shade = np.where(np.arange(geometry.CORNERS) < geometry.WIDE_CORNERS, 1.0, SIDE_SHADE)[:, None]
         for layer, rows in zip(run.description.layers, self._rows, strict=True):
             positions, frames = run.positions[:, layer.nodes], run.material_frames[:, rows]
@@ -164,7 +164,7 @@ class RunSender:
                 )
 
     def _send_joints(self, run: RunData) -> None:
-        """Joints and guides, each on the body that carries it."""
+        """Send joints and guides, each on the body that carries it."""
         for joint in run.description.joints:
             if joint.body < 0:
                 continue
@@ -190,7 +190,7 @@ class RunSender:
             )
 
     def _send_series(self, run: RunData) -> None:
-        """Curves: stimulus, forces of contact and of rods on each body, heights, energies, the solver's health."""
+        """Send curves: stimulus, forces of contact and of rods on each body, heights, energies, the solver's health."""
         groups: dict[str, dict[str, np.ndarray]] = {
             "stimulus": {name: run.stimulus[:, i] for i, name in enumerate(run.description.channels)},
             "contact_force": self._sizes("contact_force", run, run.contact_wrenches),
@@ -303,7 +303,7 @@ def _mesh(parts: geometry.Mesh) -> rr.Mesh3D:
 
 
 def log_bodies(recording: rr.RecordingStream, description: Description, scales: Scales, under: str) -> None:
-    """Surfaces of bodies; one without any has a pose alone."""
+    """Log the surfaces of bodies; one without any has a pose alone."""
     for body in description.bodies:
         if body.shape is not None:
             plane = body.shape.kind == "plane"
@@ -312,7 +312,7 @@ def log_bodies(recording: rr.RecordingStream, description: Description, scales: 
 
 
 def send_bodies(recording: rr.RecordingStream, run: RunData, under: str) -> None:
-    """Where bodies are."""
+    """Send the poses of bodies."""
     for index, body in enumerate(run.description.bodies):
         for part in _chunks(len(run.times)):
             recording.send_columns(

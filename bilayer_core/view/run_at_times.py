@@ -87,7 +87,7 @@ class Moments:
         return np.concatenate(points)
 
     def all_points(self, moment: Moment, metres_per_newton: float) -> np.ndarray:
-        """Those of all bodies and obstacles, and the tips of arrows of contact too."""
+        """Return the points of the rods, of all bodies and obstacles, and the tips of arrows of contact too."""
         points = [self._rod_points(moment), moment.positions + metres_per_newton * moment.contact_forces]
         points += [self._body_points(moment, index) for index in range(self._bodies)]
         points += [shape_extent(o.shape) for o in self._run.description.obstacles if o.shape.kind != "plane"]

@@ -121,7 +121,7 @@ class Window:
         return self._pixels()
 
     def _add_light(self) -> None:
-        """One from the eye: materials say by themselves what it lights (`stage.py`)."""
+        """Add one light from the eye: materials say by themselves what it lights (`stage.py`)."""
         from vtkmodules.vtkRenderingCore import vtkLight
 
         self.renderer.SetAutomaticLightCreation(False)
@@ -130,7 +130,7 @@ class Window:
         self.renderer.AddLight(light)
 
     def _look(self, shot: Shot, part: Part) -> None:
-        """Aim the camera of the whole picture so that it sees a part along the same lines of sight."""
+        """Turn the camera of the whole picture so that it sees a part along the same lines of sight."""
         width, height = self._size
         left, upper, right, lower = part
         share = (lower - upper) / height
@@ -157,7 +157,7 @@ class Window:
 
 
 def lay_over(picture: np.ndarray, drawn: np.ndarray, part: Part) -> None:
-    """Lay what was drawn with twice as many pixels along each side over a part of a picture, smaller by as much.
+    """Draw what has twice as many pixels along each side over a part of a picture, smaller by as much.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ class Backlog(Generic[Item]):
         return len(self._items)
 
     def put(self, item: Item, patience: float | None = None) -> bool:
-        """Hand an item over when there is room for it.
+        """Put an item into the queue when there is room for it.
 
         Parameters
         ----------
@@ -57,7 +57,7 @@ class Backlog(Generic[Item]):
             return True
 
     def add(self, item: Item, urgent: bool = False) -> None:
-        """Hand an item over whether there is room or not; an urgent one is taken at once. Never waits."""
+        """Put an item into the queue whether there is room or not; an urgent one is taken at once. Never waits."""
         with self._changed:
             self._urgent = self._urgent or urgent
             self._append(item)

@@ -104,5 +104,5 @@ class ChunkTable:
             yield self[chunk], found
 
     def _are(self, channels: Collection[int]) -> np.ndarray:
-        """Which runs of messages are of some channels."""
+        """Return which runs of messages are of some channels."""
         return np.isin(np.asarray(self._channel), list(channels))

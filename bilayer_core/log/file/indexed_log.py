@@ -108,7 +108,9 @@ class IndexedLog:
         self._resources.close()
 
     def messages(self, channels: Collection[int], start: int) -> Iterator[Message]:
-        """Messages of some channels from `start` [ns] on, by time; those of one time in the order of the file."""
+        """Yield the messages of some channels from `start` [ns] on, by time; those of one time in the order of the
+        file.
+        """
         waiting: list[_Placed] = []
         size, starts, ends = 0, self._summary.starts, self._summary.ends
         for chunk in self._chunks:
@@ -142,7 +144,7 @@ class IndexedLog:
         return [placed[-1] for placed in sorted(found)]
 
     def _of_chunk(self, chunk: int, channels: Collection[int]) -> Iterator[_Placed]:
-        """Messages of some channels of a chunk, with their time and place, by which they are put in order."""
+        """Yield the messages of some channels of a chunk, with their time and place, by which they are put in order."""
         place = self._summary.place(chunk)
         with damage_told(self.path):
             inside = read_chunk(self._file, place)

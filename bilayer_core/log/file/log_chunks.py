@@ -91,7 +91,7 @@ class LogFile:
         self.topics = {channel.topic: channel.type for channel in self.channels.values()}
 
     def times(self, topic: str) -> np.ndarray:
-        """When each message of a topic was logged [ns], in the order of the file."""
+        """Return when each message of a topic was logged [ns], in the order of the file."""
         return self._chunks.times(self._numbers({topic}))
 
     def count(self, topic: str) -> int:

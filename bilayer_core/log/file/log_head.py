@@ -99,7 +99,7 @@ def read_head(path: Path) -> Head:
 
 
 def _scene(file: BinaryIO, place: Place) -> str | None:
-    """Text of the scene, if this attachment is it."""
+    """Return the text of the scene, if this attachment is it."""
     from mcap.records import Attachment
 
     if place.length > LARGEST_SCENE:

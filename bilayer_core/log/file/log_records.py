@@ -231,7 +231,7 @@ def _decompressed(packed: memoryview, compression: str, size: int) -> bytes:
 
 
 def records_of(inside: bytes) -> Iterator[tuple[int, int, int]]:
-    """Opcode, and begin and end of the content, of each whole record in what a chunk holds."""
+    """Yield the opcode, and begin and end of the content, of each whole record in what a chunk holds."""
     position, size = 0, len(inside)
     while position + HEAD.size <= size:
         opcode, length = HEAD.unpack_from(inside, position)

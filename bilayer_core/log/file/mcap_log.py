@@ -131,7 +131,7 @@ class McapRecorder:
         self._thread.start()
 
     def observe(self, frame: Frame) -> None:
-        """Hand a frame to the writer, as `patience` says.
+        """Give a frame to the writer, as `patience` says.
 
         Parameters
         ----------
@@ -266,7 +266,7 @@ class McapRecorder:
         return SimulationError(reason, self._last_time) if self._patience is None else OutputError(reason)
 
     def _what_is_kept(self) -> str:
-        """After a failure, as who reads the file will find it."""
+        """Return what is kept after a failure, as who reads the file will find it."""
         from bilayer_core.log.run.log_reader import read_info
 
         if not self.path.is_file():

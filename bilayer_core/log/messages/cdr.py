@@ -100,7 +100,7 @@ class Template:
         return {name: decode(self._buffer, field) for name, field in self.fields.items()}
 
     def numbers(self, dtype: str) -> np.ndarray:
-        """View of all that it has as numbers of one type, which is to be complete; see `place`."""
+        """Return a view of all that it has as numbers of one type, which is to be complete; see `place`."""
         self._end()
         size = np.dtype(dtype).itemsize
         count = (len(self._buffer) - len(HEADER)) // size
@@ -138,7 +138,7 @@ class Template:
 
 
 def decode(data: bytes | bytearray | memoryview, field: tuple[int, np.dtype, tuple[int, ...]]) -> np.ndarray:
-    """View of one field (an item of `Template.fields`) of a message, without a copy."""
+    """Return a view of one field (an item of `Template.fields`) of a message, without a copy."""
     offset, dtype, shape = field
     return np.frombuffer(data, dtype, int(np.prod(shape)), offset if np.prod(shape) else 0).reshape(shape)
 

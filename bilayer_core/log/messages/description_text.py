@@ -47,7 +47,7 @@ def _strand(part: StrandPart) -> Strand:
 
 
 def to_text(description: Description) -> dict[str, str]:
-    """One JSON value for each attribute but the scene's text, which a log holds as an attachment."""
+    """Return one JSON value for each attribute but the scene's text, which a log holds as an attachment."""
     attributes = asdict(description)
     del attributes["scene_text"]
     return {name: json.dumps(value, default=_plain) for name, value in attributes.items()}

@@ -133,7 +133,7 @@ def ended_run(time: float, reason: str) -> Event:
 
 
 def _contacts(time: float, pairs: Iterable[tuple[str, str]], what: str) -> list[Event]:
-    """One event for each thing that several others touch."""
+    """Return one event for each thing that several others touch."""
     partners: dict[str, list[str]] = {}
     for first, second in sorted(pairs):
         partners.setdefault(second, []).append(first)

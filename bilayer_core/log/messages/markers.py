@@ -97,7 +97,7 @@ def force_arrows(origins: np.ndarray, forces: np.ndarray, unit: float | np.ndarr
 
 
 def shape_marker(shape: ShapeInfo) -> tuple[int, tuple[float, ...], np.ndarray]:
-    """Type, scale [m] and pose (position, quaternion x y z w) in the owner's frame of the marker of a shape."""
+    """Return type, scale [m] and pose (position, quaternion x y z w) in the owner's frame of the marker of a shape."""
     pose = np.array([*shape.position, *shape.quaternion])
     if shape.kind != "plane":
         return {"sphere": SPHERE, "box": CUBE, "cylinder": CYLINDER}[shape.kind], tuple(shape.size), pose

@@ -9,7 +9,7 @@ from bilayer_core.observed.frame import Description, Frame
 
 
 def node_order(description: Description) -> np.ndarray:
-    """Index in a `Frame` of every node of a strand, strand by strand, shape (strand nodes,)."""
+    """Return the index in a `Frame` of every node of a strand, strand by strand, shape (strand nodes,)."""
     nodes = np.arange(description.node_count)
     return np.concatenate([nodes[:0], *(nodes[strand.nodes] for strand in description.strands)])
 

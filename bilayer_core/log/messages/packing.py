@@ -13,7 +13,7 @@ from bilayer_core.errors import InputError
 
 
 def pack(parts: Sequence[tuple[str, bytes]]) -> tuple[str, bytes]:
-    """Label and data of messages by their topics."""
+    """Return the label and data of messages by their topics."""
     label = " ".join(f"{topic}:{len(data)}" for topic, data in parts)
     return label, b"".join(data for _, data in parts)
 

@@ -260,7 +260,7 @@ def _turned_to(one: Array, other: Array) -> Array:
 
 
 def rows(found: Comparison) -> Iterator[tuple[str, str, str, str]]:
-    """Name, difference with unit, part of the range, and time of each quantity, the largest part first."""
+    """Return the name, difference with unit, part of the range, and time of each quantity, the largest part first."""
     for of in sorted(found.differences, key=lambda of: -of.part):
         note = "  (interpolated)" if of.interpolated else ""
         yield of.name, f"{of.largest:.3g} {of.unit}".rstrip(), f"{of.part:.2g}", f"{of.time:g} s{note}"

@@ -113,7 +113,7 @@ def _writer(path: Path, columns: list[Column]) -> Iterator[Callable[[list[np.nda
 
 @contextmanager
 def _named(path: Path) -> Iterator[None]:
-    """Have an OSError that names no file name this one."""
+    """Let an OSError that names no file name this one."""
     try:
         yield
     except OSError as error:

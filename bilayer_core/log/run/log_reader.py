@@ -182,7 +182,7 @@ def _info_of_bag(bag: Bag, number: int) -> LogInfo:
 
 
 def _counts(topics: dict[str, str], spans: dict[str, tuple[int, int, int]]) -> dict[str, dict]:
-    """Type and number of messages of each topic, in the order of their names."""
+    """Return the type and number of messages of each topic, in the order of their names."""
     return {topic: {"type": topics[topic], "count": spans.get(topic, (0,))[0]} for topic in sorted(topics)}
 
 
@@ -261,7 +261,8 @@ def read_log(path: str | Path) -> RunData:
 
 
 def read_messages(path: str | Path, topics: set[str] | None = None) -> Iterator[tuple[str, str, int, bytes | None]]:
-    """Topic, ROS type, time [ns] and data of each message of `topics` (default all), in the order of the file.
+    """Yield the topic, ROS type, time [ns] and data of each message of `topics` (default all), in the order of the
+    file.
 
     Each topic is announced first with the data None, even if no message follows.
     """

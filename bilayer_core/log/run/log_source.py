@@ -191,7 +191,8 @@ class LogSource:
             yield decoded(self.path, topic, time, data, decode_event)
 
     def blocks(self, wanted: Iterable[Entry], most: int = BLOCK) -> Iterator[tuple[slice, dict[str, Array]]]:
-        """Values of quantities that come at one rate, in blocks of rows: where they are in the times, and by name.
+        """Yield values of quantities that come at one rate, in blocks of rows: where they are in the times, and by
+        name.
 
         Parameters
         ----------
@@ -322,7 +323,7 @@ _OF_SHAPES = ("positions", "contact_forces", "material_frames", "strain", "curva
 
 
 def size_of(path: Path) -> float:
-    """Size of a file, or of all files of a directory [bytes]; infinite for what is neither."""
+    """Return the size of a file, or of all files of a directory [bytes]; infinite for what is neither."""
     if not path.exists():
         return math.inf
     files = [path] if path.is_file() else path.rglob("*")

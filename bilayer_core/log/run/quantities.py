@@ -154,7 +154,7 @@ class Entry:
 
 
 def entries(description: Description, terms: Iterable[str], figures: Iterable[str]) -> Iterator[Entry]:
-    """All quantities of a run with such energies and figures of the solver."""
+    """Yield all quantities of a run with such energies and figures of the solver."""
     for k, (channel, unit) in enumerate(zip(description.channels, description.channel_units, strict=True)):
         yield Entry(f"stimulus/{channel}", unit, "stimulus", (k,), "stimulus_applied", (k,))
     for k, term in enumerate(terms):
@@ -182,7 +182,7 @@ def entries(description: Description, terms: Iterable[str], figures: Iterable[st
 
 
 def quantities_of(run: Run) -> Iterator[Quantity]:
-    """All quantities of a run."""
+    """Yield all quantities of a run."""
     for entry in entries(run.description, run.energy, run.solver):
         yield entry.of(run)
 

@@ -60,7 +60,7 @@ def component_unit(unit: str, label: str) -> str:
 
 
 def strand_of(entry: Entry) -> str:
-    """Name of the strand that a quantity of nodes is of; empty for others."""
+    """Return the name of the strand that a quantity of nodes is of; empty for others."""
     return entry.name.removeprefix("rod/").rpartition("/")[0] if entry.of_shape else ""
 
 

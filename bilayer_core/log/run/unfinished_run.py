@@ -30,7 +30,7 @@ class Messages:
         self._taken = taken
 
     def times(self, topic: str) -> np.ndarray:
-        """When each message of a topic was sent [ns]."""
+        """Return when each message of a topic was sent [ns]."""
         return np.array([stamp for name, stamp, _ in self._taken if name == topic], np.uint64)
 
     def count(self, topic: str) -> int:

@@ -75,6 +75,6 @@ class BodyView:
 
 
 def body_views(present: Present) -> ByName[BodyView]:
-    """Every body by name."""
+    """Return every body by name."""
     names = present.model.bodies.names
     return ByName("bodies", {name: BodyView(present, index) for index, name in enumerate(names)})

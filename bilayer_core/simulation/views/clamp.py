@@ -47,7 +47,7 @@ class ClampView:
 
 
 def clamp_views(present: Present) -> ByName[ClampView]:
-    """Every held end of a rod, as ``ROD.start`` or ``ROD.end``."""
+    """Return every held end of a rod, as ``ROD.start`` or ``ROD.end``."""
     model, ends = present.model, {}
     layers = {copy: [layer.name for layer in rod.layers] for rod in model.scene.rods for copy in rod.copy_names}
     for strand in model.strands:

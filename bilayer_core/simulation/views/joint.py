@@ -62,7 +62,7 @@ class JointView:
 
 
 def joint_views(present: Present) -> ByName[JointView]:
-    """Every joint by name."""
+    """Return every joint by name."""
     joints = enumerate(present.model.scene.joints)
     views = {joint.name: JointView(present, joint.name, joint.bodies, index) for index, joint in joints}
     return ByName("joints", views)

@@ -133,7 +133,7 @@ class LayerView:
 
 
 def rod_views(present: Present) -> ByName[RodView]:
-    """Every rod by name; copies of a pattern are rods of their own."""
+    """Return every rod by name; copies of a pattern are rods of their own."""
     return ByName("rods", {name: RodView(present, name, own) for name, own in _strands_of(present.model).items()})
 
 
