@@ -192,7 +192,9 @@ class GapCheck:
 
 
 def _parts(way: float, size: float) -> int:
-    """Into how many a way is cut that could pass through something of a size [m]; 0 if they would be too many."""
+    """Return into how many parts a way is cut that could pass through something of a size [m]; 0 if they would be too
+    many.
+    """
     parts = math.ceil(way / (0.5 * size))
     return parts if parts <= MOST_PARTS else 0
 
@@ -262,7 +264,7 @@ class PairsOfEdges:
         return np.minimum(first, second) * self._edges + np.maximum(first, second)
 
     def _allowed(self, first: Array, second: Array) -> tuple[Array, Array]:
-        """Those pairs that may not come together."""
+        """Return those pairs that may not come together."""
         surfaces = self._model.rod_search
         rod_a, rod_b = surfaces.edge_rod[first], surfaces.edge_rod[second]
         arc, length = surfaces.edge_arc.mean(axis=1), surfaces.rod_length[rod_a]

@@ -46,7 +46,7 @@ class Verdict(BilayerError):
         self.reason, self.time = reason, time
 
     def __reduce__(self) -> tuple:
-        """For its way between processes."""
+        """Reduce the error to what makes it again in another process."""
         return type(self), (self.reason, self.time)
 
 
@@ -166,7 +166,7 @@ class _Momentum:
         return self._simulator.momentum / (model.rods.node_mass.sum() + model.free_bodies.mass.sum())
 
     def off(self, frame: Frame) -> float:
-        """By how much the velocity of the mass centre is not what it must be, over what is allowed."""
+        """Return by how much the velocity of the mass centre is not what it must be, over what is allowed."""
         gained = np.array(self._simulator.scene.gravity) * (frame.time - self._time)
         off = float(np.linalg.norm(self._mean() - self._velocity - gained))
         fastest = float(np.linalg.norm(frame.velocities, axis=1).max())

@@ -69,7 +69,7 @@ class MetSurface:
         return math.inf if self.kind == "plane" else float(self.half.min())
 
     def distance(self, x: Array) -> Array:
-        """Signed distance of points of its frame [m], shape (n, 3) to (n,)."""
+        """Return the signed distance of points of its frame [m], shape (n, 3) to (n,)."""
         if self.kind == "plane":
             return x[:, 2]
         if self.kind == "sphere":
@@ -128,15 +128,15 @@ def surfaces_of(model: Model, points: BodyPoints) -> list[MetSurface]:
 
 
 def _nodes_meet(model: Model, meets: Array) -> Array:
-    """Which nodes of rods can meet a surface, shape (n_node,): not those that grow out of its body."""
+    """Return which nodes of rods can meet a surface, shape (n_node,): not those that grow out of its body."""
     of_rods, found = model.surfaces.rod_points.node, meets[: model.node_count].copy()
     np.logical_or.at(found, of_rods, meets[len(meets) - len(of_rods) :])
     return found
 
 
 def _points_meet(model: Model, points: BodyPoints, owned: Owned, meets: Array) -> Array:
-    """Which points can meet a surface, shape (n_point,): not those of its own body; of what goes by schedules, none
-    meets another.
+    """Return which points can meet a surface, shape (n_point,): not those of its own body; of what goes by schedules,
+    none meets another.
     """
     free = np.append(model.free_bodies.free_index[: len(model.bodies.names)] >= 0, False)
     balls = points.slot < 0

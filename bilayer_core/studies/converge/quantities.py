@@ -43,7 +43,7 @@ class Watch:
         self._touched, self._take_off = False, None
 
     def look(self, time: float) -> None:
-        """To be called after each step with the simulated time [s]."""
+        """Note what the run shows at a time [s]; to be called after each step."""
         self._times.append(time)
         self._heights.append(self._simulator.com[2])
         touches = bool(self._simulator.contact_forces.any())
@@ -52,7 +52,7 @@ class Watch:
         self._touched = touches
 
     def figures(self) -> dict[str, float]:
-        """Every quantity that the run has."""
+        """Return every quantity that the run has."""
         simulator, tips = self._simulator, self._tips
         summary = simulator.summary()
         found = _by_axis("com", simulator.com - self._com)
@@ -141,7 +141,9 @@ def _tips(simulator: Simulator) -> dict[str, int]:
 
 
 def peak(times: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
-    """Rise of the highest point over the first [m] and its time [s], from the parabola through its neighbours."""
+    """Return the rise of the highest point over the first [m] and its time [s], from the parabola through its
+    neighbours.
+    """
     top = int(heights.argmax())
     rise, when = heights[top] - heights[0], times[top]
     if 0 < top < len(heights) - 1:

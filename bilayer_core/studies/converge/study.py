@@ -251,7 +251,7 @@ def _make(
 
 
 def _run(text: str, overrides: Sequence[str], duration: float, start: np.ndarray | None) -> dict[str, float]:
-    """In a process of its own."""
+    """Run the scene, in a process of its own."""
     base = parse_scene(text, "scene")
     scene = load_scene(base.model_dump(mode="json", by_alias=True), overrides) if overrides else base
     simulator = Simulator(scene)

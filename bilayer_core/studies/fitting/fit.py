@@ -135,7 +135,7 @@ class _Search:
         self._iterations = 0
 
     def result(self) -> FitResult:
-        """Fit."""
+        """Return the fit."""
         start = np.array([p.part(p.start) for p in self._parameters])
         started = self._runs.evaluate(start)
         self._progress(f"start: {self._agreement(self._residuals(started))}")
@@ -159,7 +159,7 @@ class _Search:
         return self._concluded(found, started)
 
     def _residuals(self, values: Array) -> Array:
-        """Fit less data, weighted, shape (residuals,)."""
+        """Return fit less data, weighted, shape (residuals,)."""
         found: Array = (values[self._present] - self._observed) * self._weights[self._present]
         return found
 
@@ -299,7 +299,7 @@ def _weights(data: Data) -> Array:
 
 
 def _bounds_at(at: _Point) -> list[str]:
-    """At which bound each parameter is, if the sum of squares gets smaller beyond it."""
+    """Return at which bound each parameter is, if the sum of squares gets smaller beyond it."""
     slope = at.matrix.T @ at.residuals
     lower = (at.parts <= AT_BOUND) & (slope > 0.0)
     upper = (at.parts >= 1.0 - AT_BOUND) & (slope < 0.0)

@@ -81,7 +81,7 @@ class NotIdentifiable(BilayerError):
         self.directions, self.where, self.reason, self.note = directions, where, reason, note
 
     def __reduce__(self) -> tuple[object, ...]:
-        """For its way between processes."""
+        """Reduce the error to what makes it again in another process."""
         return type(self), (self.directions, self.where, self.reason, self.note)
 
 

@@ -132,7 +132,9 @@ def _of_table(values: Array, spacing: float, weights: Array) -> _Roughness:
 
 
 def _with_third(runs: Runs, start: Array, k: int, found: _Roughness, weights: Array) -> _Roughness:
-    """With a third derivative from wider spacings, as long as noise rules it: by noise it falls as the cube of them."""
+    """Return the roughness with a third derivative from wider spacings, as long as noise rules it: by noise it falls as
+    the cube of them.
+    """
     for wider in WIDER:
         spacing = wider * found.spacing
         if found.resolved or spacing > LARGEST_STEP:
@@ -162,5 +164,5 @@ def _root_mean_square(values: Array) -> float:
 
 
 def shares(steps: Sequence[Step], count: int) -> Array:
-    """Size of the error of each column of a Jacobian with `count` rows, shape (parameters,)."""
+    """Return the size of the error of each column of a Jacobian with `count` rows, shape (parameters,)."""
     return np.array([step.error for step in steps]) * sqrt(count)

@@ -139,7 +139,9 @@ class Runs:
             return error
 
     def _simulator_of(self, scene: SceneConfig) -> Simulator:
-        """One at the start of a scene: that of the run before, where only what it can be reset to differs."""
+        """Return a simulator at the start of a scene: that of the run before, where only what it can be reset to
+        differs.
+        """
         if self._simulator is not None and self._simulator.same_model(scene):
             self._simulator.reset(scene)
         else:

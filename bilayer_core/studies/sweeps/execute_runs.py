@@ -41,7 +41,7 @@ def present_versions() -> dict[str, str]:
 
 
 def warm() -> None:
-    """Have all kernels compiled and loaded, once in each process."""
+    """Compile and load all kernels, once in each process."""
     global _warmed
     if not _warmed:
         ensure_compiled()

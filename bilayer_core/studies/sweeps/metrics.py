@@ -123,7 +123,7 @@ def of_summary(path: str, summary: dict[str, Any]) -> Any:
 
 
 def key_paths(content: Any, before: str = "") -> Iterator[str]:
-    """Paths of all single values."""
+    """Yield the paths of all single values."""
     if isinstance(content, dict | list):
         for key, value in content.items() if isinstance(content, dict) else enumerate(content):
             yield from key_paths(value, f"{before}{key}.")

@@ -192,7 +192,7 @@ def _optuna() -> Any:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Optuna tells of each study, and that parts of it are new."""
+    """Silence Optuna, which tells of each study, and that parts of it are new."""
     verbosity = _optuna().logging.get_verbosity()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

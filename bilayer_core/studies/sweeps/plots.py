@@ -172,7 +172,7 @@ def cell_borders(levels: Column, logarithmic: bool) -> Column:
 
 
 def _parallel(figure: Any, result: SweepResult, done: list[Row], numeric: list[str], measured: list[str]) -> None:
-    """One vertical axis a column, one line a run, coloured by the first objective or metric."""
+    """Draw one vertical axis a column, one line a run, coloured by the first objective or metric."""
     from matplotlib import cm, colors
 
     axes = figure.subplots()
@@ -203,7 +203,7 @@ def _parallel(figure: Any, result: SweepResult, done: list[Row], numeric: list[s
 
 
 def front(points: np.ndarray) -> np.ndarray:
-    """Which points no other one is better than in one column and as good in the rest, where more is better.
+    """Return which points no other one is better than in one column and as good in the rest, where more is better.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ class Sweep:
     content: dict[str, Any]
 
     def points(self) -> Iterator[Point]:
-        """All its runs."""
+        """Yield all runs of the sweep."""
         for number, values in enumerate(runs_of(self.spec)):
             yield self.point(number, values)
 
@@ -65,11 +65,11 @@ class Sweep:
         return Columns(tuple(job.paths), tuple(job.metrics), job.units, dict(spec.objectives), logarithmic, spec.title)
 
     def result(self, journal: Journal) -> SweepResult:
-        """Its rows in a journal; those of other versions are left out."""
+        """Return the sweep's rows in a journal; those of other versions are left out."""
         return SweepResult(rows_of(journal, self.keys()), self.about)
 
     def point(self, number: int, values: Values) -> Point:
-        """One run."""
+        """Return one run."""
         return Point(number, self.job.key_of(values), values)
 
 

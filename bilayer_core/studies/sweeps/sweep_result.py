@@ -153,7 +153,7 @@ class SweepResult:
 
 
 def rows_of(journal: Journal, keys: set[str]) -> Iterator[Row]:
-    """Rows of some runs in a journal; without their summaries if it is a file."""
+    """Yield the rows of some runs in a journal; without their summaries if it is a file."""
     for row in journal.rows(keys):
         if journal.path is not None:
             row.summary = {}

@@ -90,7 +90,7 @@ class PlanarBeam:
         self.velocity = np.zeros_like(self.velocity)
 
     def step(self, dt: float) -> None:
-        """One step of implicit Euler [s].
+        """Advance by one step of implicit Euler [s].
 
         Raises
         ------

@@ -104,7 +104,7 @@ def _identity(peer: Peer, case: Case) -> dict:
 
 
 def _run(peer: Peer, cases: list[Case], results: Results) -> None:
-    """All cases in one process of the peer's own; what it does not answer is recorded with the reason."""
+    """Run all cases in one process of the peer's own; what it does not answer is recorded with the reason."""
     command = [sys.executable, "-m", f"{__package__}.peers.{peer.name}"]
     text = json.dumps([asdict(case) for case in cases])
     try:

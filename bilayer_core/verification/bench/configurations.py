@@ -71,7 +71,7 @@ class Configuration:
 
 
 def shapes(scene: SceneConfig) -> Iterator[tuple[str, int]]:
-    """Models and dimensions in which a scene can be simulated."""
+    """Yield the models and dimensions in which a scene can be simulated."""
     for model, dimension in product(MODELS, DIMENSIONS):
         if refusal(scene, Family(model, dimension, next(iter(INTEGRATORS)))) is None:
             yield model, dimension

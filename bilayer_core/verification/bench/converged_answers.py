@@ -142,7 +142,7 @@ def make(problem: Problem, model: str, tell: Callable[[str], None]) -> dict:
 
 
 def _limit(problem: Problem, family: Family, tell: Callable[[str], None]) -> tuple[Array, float, float | None]:
-    """Limit of the runs of a family, its error bar and the observed order."""
+    """Return the limit of the runs of a family, its error bar and the observed order."""
     found = []
     for stations, dt in problem.reference_levels[-3:]:
         tell(f"{problem.name}, {family.label}: {stations} stations, {1e3 * dt:g} ms")

@@ -114,7 +114,7 @@ class SplineRod:
 
 
 def cantilever(spans: int = 20) -> Array:
-    """Way of the tip of the common cantilever over 0.5 s: times [s] and places [m], shape (n_time, 4)."""
+    """Return the way of the tip of the common cantilever over 0.5 s: times [s] and places [m], shape (n_time, 4)."""
     e, width, thickness, density = 1e6, 0.01, 2e-3, 1000.0
     area = width * thickness
     rod = SplineRod(0.1, e * area, e * width * thickness**3 / 12.0, density * area, spans, gravity=9.81)
@@ -123,7 +123,8 @@ def cantilever(spans: int = 20) -> Array:
 
 
 def snap(spans: int = 10) -> Array:
-    """Way of the mass centre of Timoshenko's bilayer, whose top grows by 5 % within 20 ms: as `cantilever` over 0.2 s.
+    """Return the way of the mass centre of Timoshenko's bilayer, whose top grows by 5 % within 20 ms: as `cantilever`
+    over 0.2 s.
 
     The curve is the interface of two equal layers: B = 0, A = 2EA, D = 2(EI + EA h²/4), N = EA η, M = EA η h/2.
     """

@@ -39,7 +39,7 @@ def load_averages() -> list[float]:
 
 
 def cpu_model() -> str:
-    """Name of the processor."""
+    """Return the name of the processor."""
     if CPU_FILE.exists():
         for line in CPU_FILE.read_text(encoding="utf-8").splitlines():
             if line.startswith("model name"):

@@ -50,7 +50,7 @@ def draw(content: dict, directory: Path) -> list[Path]:
 
 
 def work_precision_figure(problem: Problem, runs: list[dict], chosen: Family | None, path: Path) -> None:
-    """Error against CPU time of all runs of a problem."""
+    """Draw the error against CPU time of all runs of a problem."""
     figure, axis = figure_of(1, 1, WIDE)
     bar = max(read_file()[problem.name][model]["bar"] for model in {run["model"] for run in runs})
     low = 0.5 * bar
@@ -97,7 +97,7 @@ def _keys(families: Iterable[Family]) -> list:
 
 
 def cantilever_figure(content: dict, path: Path) -> None:
-    """Pareto fronts of all tools on the common cantilever."""
+    """Draw the Pareto fronts of all tools on the common cantilever."""
     figure, axis = figure_of(1, 1, WIDE)
     for (label, runs), colour in zip(tables.cantilever_series(content).items(), SERIES, strict=False):
         runs = [run for run in pareto.done(runs) if run["error"] < 1.0]
@@ -118,7 +118,7 @@ def cantilever_figure(content: dict, path: Path) -> None:
 
 
 def scaling_figure(records: list[dict], path: Path) -> None:
-    """CPU time of a step against nodes, with slopes."""
+    """Draw the CPU time of a step against nodes, with slopes."""
     figure, axis = figure_of(1, 1, WIDE)
     steep = scaling.slopes(records, scaling.MANY)
     for ((model, dimension), slope), colour in zip(scaling.slopes(records).items(), SERIES, strict=False):

@@ -25,7 +25,7 @@ MANY = 800
 
 
 def measure(results: Results, quick: bool, progress: Callable[[str], None] = lambda text: None) -> None:
-    """CPU time of the first steps for every model and dimension, at several numbers of nodes."""
+    """Measure the CPU time of the first steps for every model and dimension, at several numbers of nodes."""
     for model, dimension, nodes in plan(quick):
         identity = {"model": model, "dimension": dimension, "nodes": nodes}
         progress(f"scaling: {model} {dimension}-D, {nodes} nodes")
@@ -34,7 +34,7 @@ def measure(results: Results, quick: bool, progress: Callable[[str], None] = lam
 
 
 def plan(quick: bool) -> list[tuple[str, int, int]]:
-    """Model, dimension and nodes of all runs."""
+    """Return the model, dimension and nodes of all runs."""
     sizes = QUICK_NODES if quick else NODES
     return [(*shape, nodes) for shape in shapes(load_scene(SCENE)) for nodes in sizes]
 

@@ -23,7 +23,7 @@ def plan(problems: Iterable[Problem], quick: bool) -> list[tuple[Problem, Config
 
 
 def check_references(runs: Iterable[tuple[Problem, Configuration]]) -> None:
-    """Refuse, before anything is computed, what no reference is there for.
+    """Refuse what no reference is there for, before anything is computed.
 
     Raises
     ------

@@ -27,7 +27,7 @@ LONG_LIMIT = 240.0
 
 @cache
 def all_cases() -> dict[str, StressCase]:
-    """Every case by its name, in a fixed order: the matrix, and torture cases, which take longer."""
+    """Return every case by its name, in a fixed order: the matrix, and torture cases, which take longer."""
     chosen = np.random.default_rng(SEED)
     cases = [*(_of_matrix(case, chosen.random() < CHOSEN) for case in matrix()), *torture_cases()]
     return {case.name: case for case in cases}

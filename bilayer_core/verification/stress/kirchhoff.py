@@ -96,5 +96,5 @@ def cantilever(scene: SceneConfig) -> tuple[Array, Array]:
 
 
 def angle_between(first: Array, last: Array) -> float:
-    """Between two unit vectors [rad]."""
+    """Return the angle between two unit vectors [rad]."""
     return 2.0 * math.asin(min(1.0, 0.5 * float(np.linalg.norm(first - last))))

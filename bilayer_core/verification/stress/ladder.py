@@ -72,7 +72,7 @@ class Torture:
     rungs: tuple[Rung, ...]
 
     def cases(self) -> Iterator[StressCase]:
-        """One case a rung."""
+        """Yield one case a rung."""
         for rung in self.rungs:
             yield StressCase(
                 name=f"{GROUP}/{self.number:02d} {self.name}/{rung.name}",

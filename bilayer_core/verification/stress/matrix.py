@@ -46,7 +46,7 @@ def matrix() -> list[MatrixCase]:
 
 
 def _set(robot: str, **changes) -> Parameters:
-    """Easy parameters of a robot, with changes."""
+    """Return easy parameters of a robot, with changes."""
     base = {"robot": robot}
     if robot == "swimmer":
         base |= {"fluid_ratio": 0.8, "added_mass": True}
@@ -58,7 +58,7 @@ def _set(robot: str, **changes) -> Parameters:
 
 
 def _axes() -> Iterator[MatrixCase]:
-    """Each axis alone, on the robots that it concerns, by the default model and by two rods."""
+    """Yield each axis alone, on the robots that it concerns, by the default model and by two rods."""
     for axis, allowed in RANGES.items():
         for robot in allowed.robots:
             for value in allowed.values:
@@ -70,7 +70,7 @@ def _axes() -> Iterator[MatrixCase]:
 
 
 def _choices() -> Iterator[MatrixCase]:
-    """Every robot by every integrator, model and dimension, and with every stimulus."""
+    """Yield every robot by every integrator, model and dimension, and with every stimulus."""
     for robot in ROBOTS:
         for integrator in CHOICES["integrator"]:
             for model, dimension in MODELS_ALONE:
@@ -84,7 +84,7 @@ def _choices() -> Iterator[MatrixCase]:
 
 
 def _sample() -> Iterator[MatrixCase]:
-    """All axes at once: a Latin hypercube, one dimension an axis.
+    """Yield samples of all axes at once: a Latin hypercube, one dimension an axis.
 
     Every second point stays near the defaults on all axes: with twenty of them from one extreme to the other hardly
     any point would lie in the region in which anything can be accurate.

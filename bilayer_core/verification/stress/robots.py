@@ -55,13 +55,13 @@ def width(p: Parameters) -> float:
 
 
 def layer_thicknesses(p: Parameters) -> tuple[float, float]:
-    """Lower and upper [m]."""
+    """Return the thickness of the lower and of the upper layer [m]."""
     upper = thickness(p) * p.thickness_ratio / (1.0 + p.thickness_ratio)
     return thickness(p) - upper, upper
 
 
 def moduli(p: Parameters) -> tuple[float, float]:
-    """Lower and upper [Pa]."""
+    """Return Young's modulus of the lower and of the upper layer [Pa]."""
     return p.youngs_modulus, p.youngs_modulus * p.modulus_ratio
 
 
@@ -100,7 +100,7 @@ def speed(p: Parameters) -> float:
 
 
 def height(p: Parameters) -> float:
-    """From which what falls has the speed at the ground [m]."""
+    """Return the height from which what falls has the speed at the ground [m]."""
     if p.gravity == 0.0:
         return 0.01 * p.length
     return min(speed(p) ** 2 / (2.0 * gravity(p)), HIGHEST * p.length / USUAL_LENGTH)
@@ -218,7 +218,9 @@ def _ground() -> list[dict]:
 
 
 def _below(p: Parameters) -> float:
-    """From a strip's path, between its layers, to its lower face, or to the upper one if that is farther [m]."""
+    """Return the distance from a strip's path, between its layers, to its lower face, or to the upper one if that is
+    farther [m].
+    """
     return max(layer_thicknesses(p))
 
 

@@ -63,7 +63,7 @@ def remedies(records: Sequence[Record]) -> tuple[int, int]:
 
 
 def shortfalls(records: Sequence[Record]) -> list[str]:
-    """Which of the goals are not reached."""
+    """Return which of the goals are not reached."""
     inside = counts(records)["inside"]
     total, found = sum(inside.values()), []
     failed = sum(record.outcome is Outcome.FAILED for record in records)

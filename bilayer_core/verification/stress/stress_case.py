@@ -153,6 +153,6 @@ class Record:
 
     @classmethod
     def from_line(cls, line: str) -> Record:
-        """Back from it."""
+        """Read a record back from its line."""
         content = json.loads(line)
         return cls(**content | {"outcome": Outcome(content["outcome"])})

@@ -66,7 +66,7 @@ def _linking(positions: Array, strands: list[slice]) -> Array:
 
 
 def comes_to_rest(trial: Trial) -> Decision:
-    """Mean speed of a heap at the end, over that of its fall."""
+    """Return the mean speed of a heap at the end, over that of its fall."""
     simulator, fastest, mass = trial.simulator, 0.0, trial.simulator.model.rods.node_mass
 
     def speed() -> float:
@@ -108,7 +108,7 @@ ALONG = 9
 
 
 def is_pressed(trial: Trial) -> Decision:
-    """Width of a coil between two walls that have closed, over their distance."""
+    """Return the width of a coil between two walls that have closed, over their distance."""
     trial.run()
     simulator = trial.simulator
     walls = simulator.frame().body_positions[:, 0]

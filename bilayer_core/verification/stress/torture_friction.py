@@ -54,7 +54,9 @@ SLIDE = 0.03
 
 
 def stands(trial: Trial) -> Decision:
-    """By how much the top of two boards has sunk, over their length, from when they have come to bear on each other."""
+    """Return by how much the top of two boards has sunk, over their length, from when they have come to bear on each
+    other.
+    """
     simulator, scene = trial.simulator, trial.simulator.scene
     coefficient = scene.contact.friction.coefficient
     needed = 0.5 / math.tan(scene.bodies[1].rotation[1] * -1.0)

@@ -52,7 +52,7 @@ STAYS, LEAVES = 2e-3, 0.02
 
 
 def _on_its_side(what: str, deflection: float, part: float) -> Decision:
-    """Small below the critical torque, large above it."""
+    """Decide that a deflection is small below the critical torque, or large above it."""
     return Decision(what, deflection, *((0.0, STAYS) if part < 1.0 else (LEAVES, math.inf)))
 
 
@@ -132,7 +132,7 @@ COILED = 0.3
 
 
 def ply(tension: float, bending: float, radius: float) -> tuple[float, float]:
-    """Angle [rad] and torque [N m] of a plectoneme under a tension [N]."""
+    """Return the angle [rad] and torque [N m] of a plectoneme under a tension [N]."""
     scale = tension * radius**2 / bending
     a = brentq(lambda a: math.sin(a) ** 4 * (0.5 + 1.0 / math.cos(2.0 * a)) - scale, 1e-6, 0.25 * math.pi - 1e-9)
     return a, 2.0 * bending / radius * math.sin(a) ** 3 * math.cos(a) / math.cos(2.0 * a)

@@ -32,7 +32,7 @@ BISECTIONS = 10
 
 
 def beam(stations: int, gravity: tuple[float, float, float] = (0.0, 0.0, 0.0), **more) -> dict:
-    """One soft layer along x, clamped at the origin."""
+    """Return one soft layer along x, clamped at the origin."""
     material = {"youngs_modulus": SOFT, "poisson_ratio": 0.5, "density": DENSITY}
     strip = rod([layer(thickness=THICKNESS)], LENGTH, stations, clamp_start="wall")
     return scene([strip], gravity=list(gravity), bodies=[fixed()], materials={"gel": material}, **more)
@@ -91,7 +91,7 @@ def imperfect_column(
 
 
 def eulers_load(dimension: int = 3) -> tuple[float, float]:
-    """End load at which a column with one free end buckles, over Euler's."""
+    """Return the end load at which a column with one free end buckles, over Euler's."""
 
     def pressed(load: float) -> dict:
         return beam(101, loads=[{"name": "press", "rod": "rod", "position": LENGTH, "force": [-load, 0, 0]}])
@@ -100,7 +100,7 @@ def eulers_load(dimension: int = 3) -> tuple[float, float]:
 
 
 def greenhills_weight(dimension: int = 3) -> tuple[float, float]:
-    """Weight at which an upright column buckles, over Greenhill's."""
+    """Return the weight at which an upright column buckles, over Greenhill's."""
     mass = DENSITY * WIDTH * THICKNESS
     return _critical(GREENHILL * BENDING / LENGTH**3 / mass, lambda g: beam(101, (-g, 0.0, 0.0)), dimension)
 

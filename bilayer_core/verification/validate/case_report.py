@@ -34,7 +34,7 @@ def write_csv(results: Sequence[Result], path: Path) -> None:
 
 
 def write_page(results: Sequence[Result], path: Path) -> None:
-    """Tables in Markdown, one a family."""
+    """Write tables in Markdown, one a family."""
     write_text(path, page(results), force=True)
 
 

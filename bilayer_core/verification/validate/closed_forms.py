@@ -42,7 +42,9 @@ def bonded_bending_stiffness(moduli: tuple[float, float], thickness: tuple[float
 
 
 def clamped_twist(torque: float, stiffness: float, warping: float, length: float) -> float:
-    """Angle [rad] between the ends of a rod neither of which may warp: GJ τ − EC_w τ″ = T, τ = 0 there (Vlasov)."""
+    """Return the angle [rad] between the ends of a rod neither of which may warp: GJ τ − EC_w τ″ = T, τ = 0 there
+    (Vlasov).
+    """
     decay = math.sqrt(warping / stiffness)
     return torque / stiffness * (length - 2.0 * decay * math.tanh(0.5 * length / decay))
 
@@ -217,7 +219,8 @@ def end_loaded_cantilever(load: float, follower: bool) -> np.ndarray:
 
 
 def kirchhoff_plate(velocity: tuple[float, float], own: float, whole: float, moment: float, time: float) -> float:
-    """Angle [rad] to which a rigid plate turns that is thrown aslant into a perfect fluid at rest (Lamb 1932, ch. VI).
+    """Return the angle [rad] to which a rigid plate turns that is thrown aslant into a perfect fluid at rest (Lamb
+    1932, ch. VI).
 
     In its plane of motion, with u along the plate, v across it, m its own mass and n that with the fluid it takes
     along:  m u̇ = n ω v,  n v̇ = −m ω u,  I ω̇ = −(n − m) u v,  θ̇ = ω.

@@ -36,7 +36,7 @@ def block(gravity: list[float], friction: dict, dt: float = 1e-3) -> Simulator:
 
 
 def acceleration(simulator: Simulator, settle: float = 0.05, time: float = 0.2) -> np.ndarray:
-    """Mean acceleration of the nodes over `time` [s], after `settle` [s], shape (3,)."""
+    """Return the mean acceleration of the nodes over `time` [s], after `settle` [s], shape (3,)."""
     simulator.run(settle)
     before = simulator.velocities.mean(axis=0)
     simulator.run(time)

@@ -29,7 +29,7 @@ def beside_free_end(m: float, n: float, dimension: int) -> tuple[float, float]:
 
 @cache
 def patched(m: float, n: float, dimension: int, stations: int = STATIONS) -> tuple[float, float]:
-    """Angle [rad] and sag [m] of the end of a strip with a growing layer on a tenth of it."""
+    """Return the angle [rad] and sag [m] of the end of a strip with a growing layer on a tenth of it."""
     config = bending.strip(m, n, STRAIN, stations)
     config["rods"][0]["path"]["length"] = LENGTH
     config["rods"][0]["layers"][1]["interval"] = list(PATCH)
@@ -58,7 +58,9 @@ def beam(m: float, n: float) -> tuple[float, float]:
 
 @cache
 def turned(model: str, stations: int) -> tuple[float, float]:
-    """Angle [rad] by which a patch turns its strip that begins and ends between stations, and that of an arc."""
+    """Return the angle [rad] by which a patch turns its strip that begins and ends between stations, and that of an
+    arc.
+    """
     config = bending.strip(1.0, 1.0, SMALL, stations)
     config["rods"][0]["path"]["length"] = LENGTH
     config["rods"][0]["layers"][1]["interval"] = list(LONG_PATCH)

@@ -43,7 +43,7 @@ def acceleration(direction: str, layers: list[dict]) -> tuple[float, float]:
 
 
 def munk(across: float) -> tuple[float, float]:
-    """Angle [rad] to which a stiff strip turns in 0.1 s that is thrown aslant."""
+    """Return the angle [rad] to which a stiff strip turns in 0.1 s that is thrown aslant."""
     stiff = {"gel": {**GEL, "youngs_modulus": 1e10}}
     solver = {"dt": 5e-4, "newton_tolerance": 1e-9, "integrator": "sdirk2"}
     simulator = Simulator(load_scene(strip(WHOLE, materials=stiff, solver=solver)))

@@ -209,7 +209,7 @@ STRAIN, STRIP = 0.05, 0.1
 
 
 def stride(forward: float, backward: float, stations: int) -> tuple[float, float]:
-    """Way of the middle of a strip [mm] that extends evenly and goes back.
+    """Return the way of the middle of a strip [mm] that extends evenly and goes back.
 
     It rests where the friction of what slides backward and of what slides forward are equal: at the part
     μ₊/(μ₊ + μ₋) of its length as it extends, and at 1 minus that as it goes back. So it advances by ε L times the

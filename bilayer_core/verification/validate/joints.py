@@ -22,7 +22,7 @@ PINNED, CLAMPED = math.pi**2, 20.190729
 
 
 def layers_of(model: str) -> list[dict]:
-    """One layer, or two of the same thickness together."""
+    """Return one layer, or two of the same thickness together."""
     if model == "laminate":
         return [layer(thickness=THICKNESS)]
     return [layer("bottom", thickness=0.5 * THICKNESS), layer("top", thickness=0.5 * THICKNESS)]
@@ -80,7 +80,7 @@ def _arch_stands(model: str, dimension: int, load: float) -> bool:
 
 
 def snapping_load(model: str, dimension: int) -> tuple[float, float]:
-    """Load at the middle [N/m] under which a shallow arch snaps through, found by halving.
+    """Return the load at the middle [N/m] under which a shallow arch snaps through, found by halving.
 
     With a rise y left of a, thrust EA k²/4 (a² − y²) and k = π/L, the arch bears EI k⁴ (a − y + A/(4I) (a² − y²) y),
     most at y² = (a² − 4I/A)/3 (Timoshenko and Gere, Theory of Elastic Stability).
@@ -146,7 +146,7 @@ def _hinge(name: str, first: str, second: str, point: tuple) -> dict:
 
 
 def _swings(content: dict, model: str, dimension: int) -> float:
-    """Time of a whole swing of the last node [s]."""
+    """Return the time of a whole swing of the last node [s]."""
     simulator = Simulator(load_scene(content), model=model, dimension=dimension, integrator="sdirk2", dt=5e-4)
     rest = 0.0 if content["name"] == "sample" else LENGTH
     times, last = [], simulator.positions[-1, 0] - rest

@@ -74,7 +74,7 @@ def rise(model: str, retardation: float = RETARDATION, stations: int = STATIONS)
 
 
 def _shares(nodes: int) -> Array:
-    """Rest length for which each node stands [m], shape (n_node,)."""
+    """Return the rest length for which each node stands [m], shape (n_node,)."""
     share = np.full(nodes, LENGTH / (nodes - 1))
     share[[0, -1]] *= 0.5
     return share

@@ -38,7 +38,7 @@ def every_node(m: float, n: float) -> tuple[float, float]:
 
 
 def covered_part(edges: int) -> tuple[float, float]:
-    """Angle by which a growing layer on a fifth of a strip turns its end, and κ times its length [rad]."""
+    """Return the angle by which a growing layer on a fifth of a strip turns its end, and κ times its length [rad]."""
     grown = layer("top", interval=[0.04, 0.06], eigenstrain={"stimulus": "heat", "gain": UNIFORM})
     config = scene(
         [rod([layer("bottom"), grown], stations=edges + 1, clamp_start="wall")],

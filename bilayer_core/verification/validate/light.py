@@ -83,7 +83,9 @@ def behind_a_turning_strip(solver: dict) -> tuple[float, float]:
 
 
 def order_in_time(integrator: str) -> tuple[float, float]:
-    """From the tip of a soft bilayer that a light which comes and goes swings, at successively halved steps."""
+    """Return the order in time from the tip of a soft bilayer that a light which comes and goes swings, at successively
+    halved steps.
+    """
     wave = {"type": "sine", "mean": 0.5, "amplitude": 0.5, "period": 0.1, "phase": -0.5 * math.pi}
     soft = {"gel": {"youngs_modulus": 1e6, "poisson_ratio": 0.5, "density": 1000.0}}
     content = lit_strip(0.6, 0.1, 11, 0.03, materials=soft)
@@ -104,7 +106,7 @@ ROOF = 0.03
 
 
 def lit_part(by: str, angle: float, model: str) -> tuple[float, float]:
-    """Part of a strip that lies outside the shadow of a roof over its outer half, from how far it bends."""
+    """Return the part of a strip that lies outside the shadow of a roof over its outer half, from how far it bends."""
     outer, high = 0.5 * LENGTH, ROOF
     content = lit_strip(math.radians(angle), SMALL, 81, light={"shadow": True})
     if by == "box":

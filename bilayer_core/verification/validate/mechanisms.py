@@ -97,7 +97,9 @@ def friction_of_a_swing(dimension: int) -> tuple[float, float]:
 
 
 def flywheel(dimension: int) -> tuple[float, float]:
-    """Whole turn of a wheel that friction of its hinge brings to rest [rad], I ω²/(2 M), more than two times round."""
+    """Return the whole turn of a wheel that friction of its hinge brings to rest [rad], I ω²/(2 M), more than two times
+    round.
+    """
     inertia, speed, angle = 1e-6, 40.0, 15.0
     law = {"friction": inertia * speed**2 / (2.0 * angle), "friction_speed": 0.01}
     motion = {"type": "guided", "hinge": [0, 1, 0], "mass": 1e-3, "inertia": [inertia] * 3, "angular_speed": speed}
@@ -108,7 +110,7 @@ def flywheel(dimension: int) -> tuple[float, float]:
 
 
 def rebound(dimension: int) -> tuple[float, float]:
-    """Time in which a pendulum falls on a limit where it would hang, and comes back [ms], half a period."""
+    """Return the time in which a pendulum falls on a limit where it would hang, and comes back [ms], half a period."""
     start = math.radians(3.0)
     content = pendulum(start, axis=(0, 1, 0), limits=[-0.1, start], limit_stiffness=1e4)
     simulator = Simulator(load_scene(content), dimension=dimension, integrator="tr_bdf2", tolerance=1e-6)
@@ -131,7 +133,9 @@ def rest_on_a_limit(dimension: int) -> tuple[float, float]:
 
 
 def bead(dimension: int, **sliding) -> tuple[float, float]:
-    """Way of a block down a guide tilted by 30°, in 0.2 s [mm], ½ (g sin β − F/m) t², against friction and without."""
+    """Return the way of a block down a guide tilted by 30°, in 0.2 s [mm], ½ (g sin β − F/m) t², against friction and
+    without.
+    """
     tilt, time = math.radians(30.0), 0.2
     axis = [math.cos(tilt), 0.0, -math.sin(tilt)]
     block = {
@@ -148,7 +152,7 @@ def bead(dimension: int, **sliding) -> tuple[float, float]:
 
 
 def rotating_guide(dimension: int) -> tuple[float, float]:
-    """Way of a bead out along a guide that a heavy wheel turns [mm], r (cosh ωt − 1)."""
+    """Return the way of a bead out along a guide that a heavy wheel turns [mm], r (cosh ωt − 1)."""
     speed, radius, time, inertia = 10.0, 0.02, 0.15, 10.0
     turns = {"type": "guided", "hinge": [0, 1, 0], "mass": 1.0, "inertia": [inertia] * 3, "angular_speed": speed}
     free = {"type": "free", "mass": MASS, "inertia": [INERTIA] * 3}

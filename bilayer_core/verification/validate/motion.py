@@ -34,7 +34,7 @@ def free_bilayer(**solver) -> Simulator:
 
 
 def momentum_lost(integrator: str) -> tuple[float, float]:
-    """Change of linear momentum of a strip in violent vibration, over the momentum."""
+    """Return the change of linear momentum of a strip in violent vibration, over the momentum."""
     simulator = free_bilayer(dt=1e-4, integrator=integrator)
     rng = np.random.default_rng(3)
     let_go(simulator, 0.2 * rng.standard_normal((simulator.model.node_count, 3)))
@@ -46,7 +46,9 @@ def momentum_lost(integrator: str) -> tuple[float, float]:
 
 @cache
 def _spin_lost(integrator: str, dt: float) -> float:
-    """Change of angular momentum of a soft strip that spins about its normal at 20 rad/s for 50 ms, over its own."""
+    """Return the change of angular momentum of a soft strip that spins about its normal at 20 rad/s for 50 ms, over its
+    own.
+    """
     ribbon = rod([layer(thickness=2e-3)], length=0.1, stations=11, start=(-0.05, 0, 0))
     gel = {"youngs_modulus": 1e5, "poisson_ratio": 0.5, "density": 1000.0}
     solver = {"dt": dt, "integrator": integrator, "newton_tolerance": 1e-11}
@@ -62,14 +64,15 @@ def _spin_lost(integrator: str, dt: float) -> float:
 
 
 def order_of_spin(integrator: str) -> tuple[float, float]:
-    """Order at which the loss of angular momentum falls with the step."""
+    """Return the order at which the loss of angular momentum falls with the step."""
     coarse, fine = (abs(_spin_lost(integrator, dt)) for dt in (2e-4, 1e-4))
     return math.log2(coarse / fine), float(INTEGRATORS[integrator].order)
 
 
 @cache
 def precession() -> tuple[float, float]:
-    """Angle [rad] by which the axis of a stiff rod goes round its angular momentum L, of which its spin is a part.
+    """Return the angle [rad] by which the axis of a stiff rod goes round its angular momentum L, of which its spin is a
+    part.
 
     A rigid top with the moments of inertia J about its axis and I across it: |L|/I, L = J ω t + I ω₁. A rod resists
     turns across itself by the masses of its nodes, I = m (L² + 2 l²)/12 with edges of length l.
@@ -92,7 +95,9 @@ STEPS = (1e-3, 5e-4, 2.5e-4)
 
 
 def order_in_time(integrator: str) -> tuple[float, float]:
-    """From the tip of a soft bilayer that a smooth force swings far, at successively halved steps."""
+    """Return the order in time from the tip of a soft bilayer that a smooth force swings far, at successively halved
+    steps.
+    """
     config = scene(
         [rod([layer("bottom"), layer("top")], length=0.06, stations=11, clamp_start="wall")],
         bodies=[fixed()],
@@ -179,7 +184,7 @@ def _way_fallen(duration: float, dimension: int, **steps) -> float:
 
 
 def fall_in_short_steps(integrator: str) -> tuple[float, float]:
-    """In 200 steps of 1 µs; implicit Euler falls by ½ g t (t + h)."""
+    """Return the fall in 200 steps of 1 µs; implicit Euler falls by ½ g t (t + h)."""
     dt, steps = 1e-6, 200
     time = steps * dt
     late = dt if INTEGRATORS[integrator].order == 1 else 0.0
@@ -187,7 +192,7 @@ def fall_in_short_steps(integrator: str) -> tuple[float, float]:
 
 
 def fall_by_default() -> tuple[float, float]:
-    """In half a second of adaptive steps."""
+    """Return the fall in half a second of adaptive steps."""
     return _way_fallen(0.5, 2), 0.125 * WEAK
 
 

@@ -35,7 +35,7 @@ def draw(cases: Iterable[Case], directory: Path) -> list[Path]:
 
 
 def bending_figure(path: Path) -> None:
-    """Fig. 3: normalised curvature against ratios of modulus and of thickness."""
+    """Draw Fig. 3: normalised curvature against ratios of modulus and of thickness."""
     figure, axes = figure_of(1, 2, (9.0, 3.8))
     fine = np.logspace(-1.0, 1.0, 200)
     for axis, (sweep, ratios), label in zip(
@@ -56,7 +56,7 @@ def bending_figure(path: Path) -> None:
 
 
 def helix_figure(path: Path) -> None:
-    """Fig. 4: ribbons of a turn and a half as computed, and helices of least energy."""
+    """Draw Fig. 4: ribbons of a turn and a half as computed, and helices of least energy."""
     figure, axes = figure_of(2, 3, (9.0, 6.4), projection="3d")
     for row, torsion in zip(axes, helix.TORSIONS, strict=True):
         for axis, natural in zip(row, helix.NATURAL, strict=True):
@@ -81,7 +81,7 @@ def helix_figure(path: Path) -> None:
 
 
 def laminate_figure(path: Path) -> None:
-    """How far two bonded rods are from the laminate, against the stiffness of their bond."""
+    """Draw how far two bonded rods are from the laminate, against the stiffness of their bond."""
     figure, axis = figure_of(1, 1, (6.4, 4.2))
     curves = {f"grows by a wave, {edges} edges": partial(laminate.wave, edges) for edges in MESHES}
     for (label, compute), shade in zip(curves.items(), ("#9ecae1", "#4292c6", "#08519c"), strict=True):

@@ -11,7 +11,7 @@ GROUND = {"name": "ground", "type": "plane", "point": [0, 0, 0], "normal": [0, 0
 
 
 def layer(name="only", thickness=1e-3, material="gel", **more):
-    """One layer."""
+    """Return one layer."""
     return {"name": name, "material": material, "thickness": thickness, **more}
 
 

@@ -126,7 +126,7 @@ def _case(pitch_angle: float, model: str, pairs: bool, figure: str, limit: float
 
 
 def order_in_space() -> tuple[float, float]:
-    """Order at which the error of the extension falls; 2."""
+    """Return the order at which the error of the extension falls; 2."""
     theory = expected(PITCH_ANGLES[0])[0, 0]
     coarse, fine = (
         abs(compliance(PITCH_ANGLES[0], "laminate", False, edges)[0, 0] - theory)

@@ -50,7 +50,7 @@ def blade(part: float) -> dict:
 
 
 def least_warned() -> tuple[float, float]:
-    """Part of the critical force from which a run in a plane warns that the blade would have left it."""
+    """Return the part of the critical force from which a run in a plane warns that the blade would have left it."""
     low, high = 0.9, 1.1
     for _ in range(6):
         middle = 0.5 * (low + high)

@@ -46,7 +46,9 @@ def _on_the_way(dimension: int) -> tuple[float, float]:
 
 @cache
 def _lag(dimension: int) -> float:
-    """Time [s] by which the hub is behind goals that move steadily, of which each comes a period after the last."""
+    """Return the time [s] by which the hub is behind goals that move steadily, of which each comes a period after the
+    last.
+    """
     simulator = _hub(dimension)
     for k in range(100):
         simulator.set_pose("hub", [STREAM * PERIOD * k, 0.0, 0.0])

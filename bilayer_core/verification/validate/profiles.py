@@ -24,7 +24,7 @@ def linear(first: float, last: float) -> dict:
 
 
 def between(first: float, last: float, s: float | Array) -> float | Array:
-    """Its value at s [m]."""
+    """Return the value of such a profile at s [m]."""
     return first + (last - first) * s / LENGTH
 
 
@@ -70,13 +70,15 @@ def spiral(axis: int) -> tuple[float, float]:
 
 
 def order_of_spiral() -> tuple[float, float]:
-    """Order at which the distance of that tip from its place falls; 2."""
+    """Return the order at which the distance of that tip from its place falls; 2."""
     coarse, fine = (np.linalg.norm(np.subtract(*_spiral(edges))) for edges in (EDGES // 2, EDGES))
     return float(np.log2(coarse / fine)), 2.0
 
 
 def twist() -> tuple[float, float]:
-    """Turn of the end [rad] of a strip with natural twist on a part; a free end has no element, for half an edge."""
+    """Return the turn of the end [rad] of a strip with natural twist on a part; a free end has no element, for half an
+    edge.
+    """
     simulator = settled([layer(natural_twist={"at": [0.02, 0.06], "value": [0.0, 30.0]})])
     m1 = simulator.frame().directors[-1]
     return float(np.arctan2(-m1[1], m1[2])), 30.0 * (0.5 * 0.04 + 0.04 - 0.5 * LENGTH / EDGES)

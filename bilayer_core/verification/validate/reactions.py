@@ -29,7 +29,7 @@ def cantilever(model: str, dimension: int, retardation_time: float = 0.0, **step
 
 
 def load_of_nodes(simulator: Simulator, acceleration: np.ndarray) -> np.ndarray:
-    """Weight [N] of all nodes less their inertia, and its moment about the clamp [N m], shape (6,)."""
+    """Return the weight [N] of all nodes less their inertia, and its moment about the clamp [N m], shape (6,)."""
     force = simulator.model.rods.node_mass[:, None] * (GRAVITY - acceleration)
     arms = simulator.positions - simulator.clamps["arm.start"].position
     return np.concatenate([force.sum(axis=0), np.cross(arms, force).sum(axis=0)])
@@ -44,7 +44,7 @@ def _hanging(model: str, dimension: int) -> tuple[np.ndarray, np.ndarray]:
 
 @cache
 def _blocked(model: str, dimension: int) -> np.ndarray:
-    """On the second of two clamps."""
+    """Return the force and moment on the second of two clamps."""
     layers = [layer("bottom", THICK), layer("top", THIN, eigenstrain={"stimulus": "humidity", "gain": STRAIN})]
     strip = rod(layers, 0.03, 13, width=WIDTH, clamp_start="left", clamp_end="right")
     content = scene(
@@ -60,7 +60,9 @@ def _blocked(model: str, dimension: int) -> np.ndarray:
 
 @cache
 def _held_tip(model: str, dimension: int, stations: int) -> float:
-    """Force across [N] on a joint that slides along the strip and turns, at the tip of a bilayer that would bend."""
+    """Return the force across [N] on a joint that slides along the strip and turns, at the tip of a bilayer that would
+    bend.
+    """
     layers = [layer("bottom", THICK), layer("top", THIN, eigenstrain={"stimulus": "humidity", "gain": SMALL})]
     strip = rod(layers, LENGTH, stations, width=WIDTH, clamp_start="wall", clamp_end="tip")
     tip = {"type": "guided", "axis": [1, 0, 0], "hinge": [0, 1, 0]}

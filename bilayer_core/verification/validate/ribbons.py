@@ -24,8 +24,8 @@ PLACES = 8
 
 @cache
 def pressed(radius: float, worst: bool) -> float:
-    """Force [N] that a strip feels of a ball that stands at the gap `GAP` over it; the one farthest from the mean of
-    several places, or the mean.
+    """Return the force [N] that a strip feels of a ball that stands at the gap `GAP` over it; the one farthest from the
+    mean of several places, or the mean.
     """
     patch = math.sqrt(2.0 * (radius + 0.5 * THICKNESS) * BARRIER)
     random = np.random.default_rng(7)

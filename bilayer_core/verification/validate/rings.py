@@ -97,7 +97,7 @@ def _next(simulator: Simulator, dt: float, figure) -> float:
 
 
 def _pulled_height(force: float) -> float:
-    """Half the height of a pulled ring [m], from the equation of its quarter."""
+    """Return half the height of a pulled ring [m], from the equation of its quarter."""
     from scipy.integrate import solve_ivp
     from scipy.optimize import brentq
 
@@ -134,7 +134,7 @@ def pulled(kind: str, part: float, edges: int = EDGES) -> float:
 
 
 def softness(kind: str) -> tuple[float, float]:
-    """Change of the diameter with small forces, in R³/EI; what is quadratic in the force has dropped out."""
+    """Return the change of the diameter with small forces, in R³/EI; what is quadratic in the force has dropped out."""
     part = 1e-3
     return (pulled(kind, part) - pulled(kind, -part)) / (2.0 * part * RADIUS), math.pi / 4.0 - 2.0 / math.pi
 
@@ -149,7 +149,7 @@ def stretched(kind: str, part: float) -> tuple[float, float]:
 
 
 def order_in_space() -> tuple[float, float]:
-    """Order at which the diameter's changes fall when edges are halved, twice."""
+    """Return the order at which the diameter's changes fall when edges are halved, twice."""
     coarse, middle, fine = (pulled("laminate, 2-D", LARGE[0], part * EDGES) for part in (2, 4, 8))
     return math.log2((coarse - middle) / (middle - fine)), 2.0
 

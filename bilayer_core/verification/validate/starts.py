@@ -25,7 +25,7 @@ def _free(dimension: int) -> dict:
 
 @cache
 def thrown(dimension: int, model: str) -> float:
-    """Mean speed of the mass centre of a strip that hangs on a thrown hub of its own mass [m/s]."""
+    """Return the mean speed of the mass centre of a strip that hangs on a thrown hub of its own mass [m/s]."""
     motion = {"type": "free", "mass": 2e-3, "inertia": [1e-7] * 3, "velocity": [0, 0, SPEED]}
     strip = rod([layer(thickness=1e-3), layer("upper")], clamp_start="hub")
     hub = {"name": "hub", "position": [0, 0, 0], "motion": motion}
@@ -38,7 +38,7 @@ def thrown(dimension: int, model: str) -> float:
 
 @cache
 def spun(dimension: int, model: str) -> float:
-    """Angle by which a free strip has turned that starts with a spin about y [rad]."""
+    """Return the angle by which a free strip has turned that starts with a spin about y [rad]."""
     strip = rod([layer(thickness=1e-3), layer("upper")])
     solver = _free(dimension) | {"model": model, "tolerance": 1e-6}
     simulator = Simulator(load_scene(scene([strip], solver, angular_velocity=[0, SPIN, 0])))

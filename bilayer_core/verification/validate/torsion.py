@@ -72,7 +72,7 @@ def torsional_stiffness(
 
 
 def clamped_ends(torsion: str, edges: int) -> tuple[float, float]:
-    """Angle of the crank of two rods whose centrelines may not tilt at their ends, and Vlasov's [rad]."""
+    """Return the angle of the crank of two rods whose centrelines may not tilt at their ends, and Vlasov's [rad]."""
     stiffness = strip_torsion((SHEAR_MODULUS, SHEAR_MODULUS), THICKNESS, 0.01)[torsion]
     moment = TWIST * stiffness
     simulator = Simulator(load_scene(twisted_strip(torsion, edges, moment)), model="two_rod")

@@ -57,7 +57,7 @@ def end_of(simulator: Simulator, axis: float) -> Array:
 
 @cache
 def _hanging(section: Section, direction: str, edges: int) -> tuple[Array, Array]:
-    """End of the path at rest under its weight, as computed and by the judge [m]."""
+    """Return the end of the path at rest under its weight, as computed and by the judge [m]."""
     gravity = DIRECTIONS[direction]
     simulator = Simulator(load_scene(scene_of(section, edges, gravity=in_space(gravity))))
     simulator.solve_static()
@@ -71,7 +71,7 @@ def hanging(section: Section, direction: str, axis: int) -> tuple[float, float]:
 
 
 def order_in_the_mesh(section: Section, direction: str) -> tuple[float, float]:
-    """Order at which the end of a strip under its weight comes near the judge's."""
+    """Return the order at which the end of a strip under its weight comes near the judge's."""
     errors = [np.linalg.norm(np.subtract(*_hanging(section, direction, edges))) for edges in (EDGES, 2 * EDGES)]
     return math.log2(errors[0] / errors[1]), 2.0
 
@@ -90,7 +90,7 @@ def covered_part() -> tuple[float, float]:
 
 
 def end_force(section: Section, force: tuple[float, float], follower: bool) -> tuple[float, float]:
-    """Way of the end across the strip under a force on its path [mm]; components along path and normal."""
+    """Return the way of the end across the strip under a force on its path [mm]; components along path and normal."""
     load = {"name": "pull", "rod": "rod", "position": LENGTH, "force": in_space(force)}
     if follower:
         load |= {"frame": "material", "force": [*force, 0.0]}
@@ -106,7 +106,9 @@ def end_force(section: Section, force: tuple[float, float], follower: bool) -> t
 
 
 def secant() -> tuple[float, float]:
-    """Way of the end of a column at half its Euler load, on the path [mm]: e (sec(L √(P/EI)) − 1), about the axis."""
+    """Return the way of the end of a column at half its Euler load, on the path [mm]: e (sec(L √(P/EI)) − 1), about the
+    axis.
+    """
     section = Section(WIDTH, (1e7, 1e8), (1000.0, 1000.0), (2e-3, 2e-3))
     load = 0.5 * (0.5 * math.pi / LENGTH) ** 2 * section.bending
     config = scene_of(section, loads=[{"name": "press", "rod": "rod", "position": LENGTH, "force": [-load, 0.0, 0.0]}])
@@ -118,7 +120,9 @@ def secant() -> tuple[float, float]:
 
 
 def point_mass() -> tuple[float, float]:
-    """Way aside of the end of a strip that hangs with a mass of ten times its own at the end of its path [mm]."""
+    """Return the way aside of the end of a strip that hangs with a mass of ten times its own at the end of its path
+    [mm].
+    """
     section, mass = STIFF_TOP, 10.0 * STIFF_TOP.mass * LENGTH
     config = scene_of(
         section, gravity=in_space(ALONG), masses=[{"name": "lead", "rod": "rod", "position": LENGTH, "mass": mass}]
@@ -131,7 +135,7 @@ def point_mass() -> tuple[float, float]:
 
 
 def drag() -> tuple[float, float]:
-    """Way aside of the end of a strip in a flow along it, which rubs on the middle of the section [mm]."""
+    """Return the way aside of the end of a strip in a flow along it, which rubs on the middle of the section [mm]."""
     section, speed, along = STIFF_TOP, 0.3, 0.5
     fluid = {"density": 1000.0, "drag_along": along, "drag_across": 0.0, "velocity": [speed, 0.0, 0.0]}
     fluid["added_mass"] = False
@@ -176,7 +180,7 @@ def shaken() -> tuple[float, float]:
 
 
 def pendulum() -> tuple[float, float]:
-    """Angle [rad] after 0.25 s of a stiff strip on a hinge, let go where its axis hangs straight down."""
+    """Return the angle [rad] after 0.25 s of a stiff strip on a hinge, let go where its axis hangs straight down."""
     section = Section(WIDTH, (1e10, 1e10), (1000.0, 6000.0), (4e-3, 4e-3))
     hinge = {"name": "wall", "position": [0, 0, 0], "motion": {"type": "guided", "hinge": [0, 1, 0], "mass": 1e-9}}
     hinge["motion"]["inertia"] = [1e-12, 1e-12, 1e-12]
@@ -196,7 +200,7 @@ def pendulum() -> tuple[float, float]:
 
 
 def rolling() -> tuple[float, float]:
-    """Angle [rad] by which a strip rolls in 10 ms that a force per mass drives sideways through a fluid.
+    """Return the angle [rad] by which a strip rolls in 10 ms that a force per mass drives sideways through a fluid.
 
     Its own mass at the height c and the fluid's at z have T = ½ m (v − c ω)² + ½ J ω² + ½ m₂ (v − z ω)² + ½ j ω².
     """
@@ -238,7 +242,7 @@ def _spun(integrator: str, dt: float) -> tuple[float, float]:
 
 
 def order_of_spin(integrator: str) -> tuple[float, float]:
-    """Order in time at which a free strip keeps its angular momentum."""
+    """Return the order in time at which a free strip keeps its angular momentum."""
     return math.log2(_spun(integrator, 1e-3)[1] / _spun(integrator, 5e-4)[1]), 0.0
 
 

@@ -95,7 +95,9 @@ def spun(integrator: str) -> float:
 
 
 def order(integrator: str, time: float = 1e-3, steps: tuple[float, ...] = (1e-3, 5e-4, 2.5e-4)) -> tuple[float, float]:
-    """From the tip of a soft, viscous bilayer that a smooth force swings far in space, at successively halved steps."""
+    """Return the order in time from the tip of a soft, viscous bilayer that a smooth force swings far in space, at
+    successively halved steps.
+    """
     arm = rod(
         [layer("bottom"), layer("top", natural_twist=5.0)], length=0.06, stations=11, clamp_start="wall", name="arm"
     )
