@@ -105,7 +105,7 @@ class SimulationNode(ConfiguredNode):
         self._run.start()
 
     def stop(self, reason: str = STOPPED) -> None:
-        """Have the simulation end after its present step; returns at once.
+        """End the simulation after its present step; returns at once.
 
         Parameters
         ----------

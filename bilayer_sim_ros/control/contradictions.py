@@ -100,7 +100,7 @@ def source_of(topic: str, info: Mapping[str, Any]) -> Source:
 
 
 def warn_of_contradiction(node: Node, channel: str, values: Mapping[Source, float]) -> None:
-    """Warn of two controllers of a channel, by their topics and nodes."""
+    """Warn about two controllers of a channel, by their topics and nodes."""
     sides = " and ".join(f"{value:g} on {source.topic} ({_sender(node, source)})" for source, value in values.items())
     node.get_logger().warning(
         f"stimulus '{shortened(channel)}' gets {sides}: these controllers contradict each other. "

@@ -68,7 +68,7 @@ class Control:
         return math.inf if self._lockstep is None else self._lockstep.wait_ends_at
 
     def wait_anew(self) -> None:
-        """Time has stood still for another reason: begin again to wait."""
+        """Begin again to wait: time has stood still for another reason."""
         if self._lockstep is not None:
             self._lockstep.wait_anew()
 
@@ -91,7 +91,7 @@ class Control:
         self._open = self._commanded = False
 
     def act(self, simulator: Simulator) -> None:
-        """Have what was asked for act from the next step on, if that is the first from a tick on."""
+        """Let what was asked for act from the next step on, if that is the first from a tick on."""
         if not self._open:
             return
         self._open = False
@@ -124,7 +124,7 @@ class Control:
             self._lockstep.open(time, self._stands)
 
     def repeat(self, time: float) -> None:
-        """Time stands still at `time` [s]: tell those who came late, if it is that of an open tick."""
+        """Tell those who came late that time stands still at `time` [s], if it is that of an open tick."""
         if self._open and self._lockstep is not None:
             self._lockstep.publish(time)
 

@@ -40,7 +40,7 @@ class Pacer:
         self._real = self._clock()
 
     def delay(self, simulated: float) -> float:
-        """Time to wait until `simulated` [s] is due [s]; 0 when it is due or late."""
+        """Return the time to wait until `simulated` [s] is due [s]; 0 when it is due or late."""
         if self.factor == 0.0:
             return 0.0
         delay = self._real + (simulated - self._simulated) / self.factor - self._clock()

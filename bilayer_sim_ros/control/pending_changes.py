@@ -54,16 +54,16 @@ class Commands:
         return lambda: self.ask((POSE, body), lambda simulator, _: simulator.set_pose(body, position, quaternion))
 
     def ask_load(self, name: str, factor: float) -> None:
-        """Have a load act with a factor."""
+        """Let a load act with a factor."""
         self.ask(("load", name), lambda simulator, over: simulator.set_load(name, factor, over=over))
 
     def ask(self, key: tuple[str, str], action: Callable[[Simulator, float], None]) -> None:
-        """Have something done at the next tick, instead of what waits under the same key."""
+        """Ask for something to be done at the next tick, instead of what waits under the same key."""
         with self._lock:
             self._waiting[key] = action
 
     def apply(self, simulator: Simulator, over: float) -> bool:
-        """Have what waits act from now on, loads within a time [s]; poses have limits of their own.
+        """Let what waits act from now on, loads within a time [s]; poses have limits of their own.
 
         Returns
         -------

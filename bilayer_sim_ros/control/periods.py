@@ -30,9 +30,9 @@ class Periods:
         return math.floor((time - self._start) * self.rate + ROUNDING)
 
     def next_end(self, time: float) -> float:
-        """When the one that has not ended at `time` [s] does [s]."""
+        """Return the end [s] of the period that has not ended at `time` [s]."""
         return self._start + (self.complete(time) + 1) / self.rate
 
     def time_to_nearest_end(self, time: float) -> float:
-        """Time from `time` [s] to the end of a period that is nearest to one period later [s]."""
+        """Return the time from `time` [s] to the end of a period that is nearest to one period later [s]."""
         return self.next_end(time + 0.5 / self.rate) - time

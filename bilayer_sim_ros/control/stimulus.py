@@ -22,7 +22,7 @@ class Schedule(Protocol):
     """Stimulus over time as a scene prescribes it."""
 
     def value(self, t: float) -> float:
-        """Value at time `t` [s]."""
+        """Return the value at time `t` [s]."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class StimulusInputs:
         return {} if self._answers is None else self._answers.ignored
 
     def ask(self, tick: int, stand: bool = False) -> None:
-        """In lockstep: wait for answers to a tick, a time [ns]; those to it that were given before may `stand`."""
+        """Wait for answers to a tick in lockstep, a time [ns]; those to it that were given before may `stand`."""
         with self._lock:
             self._answers.open(tick, stand)
 
@@ -161,7 +161,7 @@ class StimulusInputs:
         return self._keep({name: self._channels[name].accept(value) for name, value in pairs}, tick)
 
     def answer(self, name: str, tick: int | None, take: Callable[[], None]) -> str:
-        """Have something else than a stimulus taken, and where ticks wait for it, as an answer to one.
+        """Take something else than a stimulus, and where ticks wait for it, as an answer to one.
 
         Parameters
         ----------

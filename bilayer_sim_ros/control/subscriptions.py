@@ -57,7 +57,7 @@ class Rest:
         self._ended = -math.inf
 
     def __call__(self) -> None:
-        """Rest, unless it has just been done."""
+        """Rest unless it has just been done."""
         factor = self._factor()
         length = min(0.25 / (self._rate * factor), LONGEST_REST) if factor else 0.0
         if length > 0.0 and time.monotonic() - self._ended > ROUND:

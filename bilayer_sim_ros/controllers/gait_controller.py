@@ -27,7 +27,9 @@ SHAPES = ("sine", "square", "triangle")
 
 
 def wave(shape: str, phase: float, duty: float) -> float:
-    """From 0 at a whole phase to 1 and back; `duty` is the part of a period in which it rises, or a square is high."""
+    """Return a wave that goes from 0 at a whole phase to 1 and back; `duty` is the part of a period in which it rises,
+    or a square is high.
+    """
     phase %= 1.0
     if shape == "square":
         return 1.0 if phase < duty else 0.0
@@ -76,7 +78,7 @@ class GaitController(Node):
         return self.declare_parameter(name, value, descriptor, ignore_override=True).value
 
     def refuse_nonsense(self) -> None:
-        """ValueError with the parameter that cannot be."""
+        """Refuse parameters that cannot be: a ValueError names the first."""
         faults = {
             "channels": (self.channels, bool(self.channels) and len(set(self.channels)) == len(self.channels)),
             "phases": (self.phases, len(self.phases) == len(self.channels)),

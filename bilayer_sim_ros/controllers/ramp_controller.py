@@ -35,7 +35,7 @@ FINAL_MESSAGES = 5  # how often the end value is sent
 
 
 def ramp(elapsed: float, duration: float, start_value: float, end_value: float) -> float:
-    """Value after `elapsed` of `duration` [s]; constant before and after."""
+    """Return the value after `elapsed` of `duration` [s]; constant before and after."""
     part = min(max(elapsed / duration, 0.0), 1.0)
     return (1.0 - part) * start_value + part * end_value
 
@@ -101,7 +101,7 @@ class RampController(Node):
         return self.count_subscribers(self.topic) > 0 and self.publisher.get_subscription_count() > 0
 
     def look(self) -> None:
-        """Have the simulation resumed once all is there, or give up."""
+        """Resume the simulation once all is there, or give up."""
         missing = "" if self.connected else f"nobody subscribes to {self.topic}"
         if not missing and self.start is None:
             missing = "/clock is silent, and simulated_time is true"

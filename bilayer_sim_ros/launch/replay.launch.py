@@ -10,5 +10,5 @@ from bilayer_sim_ros.node.parameters import REPLAY_NODE
 
 
 def generate_launch_description() -> LaunchDescription:
-    """One node, under whose name the log's topics are published."""
+    """Return a description of one node, under whose name the log's topics are published."""
     return node_description("replay_node", "bilayer_replay", REPLAY_NODE)

@@ -10,5 +10,5 @@ from bilayer_sim_ros.node.parameters import SIM_NODE
 
 
 def generate_launch_description() -> LaunchDescription:
-    """One node."""
+    """Return a description of one node."""
     return node_description("sim_node", "bilayer_sim", SIM_NODE)

@@ -89,7 +89,7 @@ class GraphWatch:
 
 
 def warn_of_unused_remaps(node: Node, argv: Sequence[str]) -> None:
-    """Warn of remappings of names that a node does not have but almost has."""
+    """Warn about remappings of names that a node does not have but almost has."""
     topics = {own.topic_name for own in (*node.subscriptions, *node.publishers)}
     services = {own.service_name for own in node.services}
     prefix = node.get_fully_qualified_name() + "/"
@@ -103,5 +103,5 @@ def warn_of_unused_remaps(node: Node, argv: Sequence[str]) -> None:
 
 
 def _type_name(message_type: type) -> str:
-    """Name of a message type as graphs have it."""
+    """Return the name of a message type as graphs have it."""
     return f"{message_type.__module__.partition('.')[0]}/msg/{message_type.__name__}"

@@ -25,7 +25,7 @@ PACKAGE = "bilayer_sim_ros"
 
 
 def node_description(executable: str, node_name: str, table: Sequence[NodeParameter]) -> LaunchDescription:
-    """One node of this package; arguments override what its file of parameters says.
+    """Return a description of one node of this package; arguments override what its file of parameters says.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ class LiveParameters:
         node.add_on_set_parameters_callback(self._change)
 
     def show(self, values: Mapping[str, Value]) -> None:
-        """Have parameters say what there is; called in the executor's thread."""
+        """Let parameters say what there is; called in the executor's thread."""
         parameters = [
             Parameter(name, value=value)
             for name, value in values.items()

@@ -44,7 +44,7 @@ class Stop:
         os.close(self.wakes)
 
     def set(self) -> None:
-        """Have `wait` return, now and always."""
+        """Let `wait` return, now and always."""
         self._asked = True
         self._wake()
 
@@ -81,13 +81,13 @@ class Signals:
             signal.signal(number, self._handle)
 
     def take(self) -> Stop:
-        """From now on a signal sets what is returned, and does nothing else."""
+        """Take signals over: from now on one sets what is returned, and does nothing else."""
         self._stop = Stop()
         signal.set_wakeup_fd(self._stop.wakes, warn_on_full_buffer=False)
         return self._stop
 
     def end(self) -> None:
-        """Heed no more signals: the process ends by itself. Handlers in Python would be gone before it has ended."""
+        """Ignore further signals: the process ends by itself. Handlers in Python would be gone before it has ended."""
         for number in NUMBERS:
             signal.signal(number, signal.SIG_IGN)
         signal.set_wakeup_fd(-1)

@@ -88,7 +88,7 @@ class SimulationRun:
         self._thread.start()
 
     def stop(self, reason: str) -> None:
-        """Have it end soon, for a reason that log and console tell; the first one counts."""
+        """End the run soon, for a reason that log and console tell; the first one counts."""
         with self._lock:
             if not self._stop.is_set():
                 self._reason = reason

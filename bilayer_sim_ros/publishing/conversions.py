@@ -30,12 +30,12 @@ def to_nanoseconds(seconds: float) -> int:
 
 
 def nanoseconds_of(stamp: Time) -> int:
-    """Time of a message [ns]."""
+    """Return the time of a message [ns]."""
     return stamp.sec * NANOSECONDS + stamp.nanosec
 
 
 def to_seconds(stamp: Time) -> float:
-    """Time of a message [s]."""
+    """Return the time of a message [s]."""
     return nanoseconds_of(stamp) / NANOSECONDS
 
 

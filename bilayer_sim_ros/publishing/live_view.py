@@ -46,7 +46,7 @@ class Nobody:
         """Return at once."""
 
     def end(self) -> None:
-        """Nothing to end."""
+        """Do nothing."""
 
 
 def live_view(node: Node, parameters: Mapping[str, Value]) -> Viewers:

@@ -127,7 +127,7 @@ class Recording:
             self._log = None
 
     def observe(self, frame: Frame) -> None:
-        """Hand on a frame."""
+        """Give a frame to the files."""
         for recorder in self._recorders:
             recorder.observe(frame)
 

@@ -61,7 +61,7 @@ class LogClock:
         self.running = True
 
     def stop(self) -> None:
-        """Stand still where it is."""
+        """Stop the clock where it is."""
         self.jump(self.now)
         self.running = False
 

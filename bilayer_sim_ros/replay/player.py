@@ -49,7 +49,7 @@ class Outlet(Protocol):
         """Take note that all messages of one time have been sent."""
 
     def forget(self, channel: int) -> None:
-        """Have nobody get what was published on a latched channel until now."""
+        """Delete what was published on a latched channel until now, so that nobody gets it."""
 
     def send_clock(self, now: int) -> None:
         """Publish the time of the log [ns]."""
@@ -263,7 +263,7 @@ class Player:
             self._send_next()
 
     def _end_pass(self) -> None:
-        """At the end of what is to be played."""
+        """Start the next pass, or stop, at the end of what is to be played."""
         if self._playback.loop:
             self._go_to(self._playback.begin)
         else:
@@ -292,7 +292,7 @@ class Player:
         return message if message is not None and message.time <= self._playback.end else None
 
     def _go_to(self, position: int) -> None:
-        """Have the messages from `position` [ns] on follow, and latched topics be as they were then.
+        """Go to `position` [ns]: messages from there on follow, and latched topics are as they were then.
 
         An InputError, of a file that is damaged there, changes nothing.
         """
@@ -308,7 +308,7 @@ class Player:
             self._send_clock()
 
     def _restore(self, channel: int, valid: list[Message], depth: int) -> None:
-        """Have those who come late get `valid` messages of a latched channel, and nothing that is of another time."""
+        """Give those who come late the `valid` messages of a latched channel, and nothing that is of another time."""
         held = self._held[channel]
         if held == [message.time for message in valid[: len(held)]]:
             valid = valid[len(held) :]

@@ -121,7 +121,7 @@ class ReplayTopics:
             self.latched[channel.number] = profile.depth
 
     def restart(self) -> None:
-        """Have the next markers of each topic delete those before them."""
+        """Let the next markers of each topic delete those before them."""
         self._stale = set(self._markers)
 
     def send(self, message: Message) -> None:
@@ -154,7 +154,7 @@ class ReplayTopics:
             self._run.finish_instant()
 
     def forget(self, channel: int) -> None:
-        """Have nobody get what was published on a latched channel until now."""
+        """Delete what was published on a latched channel until now, so that nobody gets it."""
         old = self._publishers[channel]
         self._node.destroy_publisher(old)
         self._publishers[channel] = self._node.create_publisher(old.msg_type, old.topic, old.qos_profile)

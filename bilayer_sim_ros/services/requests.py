@@ -28,7 +28,7 @@ class Requests:
         self._closed = threading.Event()
 
     def ask(self, action: Action) -> Future:
-        """Have `action` done. The future's result says what happened; InputError if it could not be done."""
+        """Ask for `action` to be done. The future's result says what happened; InputError if it could not be done."""
         future: Future = Future()
         self._queue.put((future, action))
         if self._closed.is_set():

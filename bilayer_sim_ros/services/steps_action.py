@@ -18,7 +18,7 @@ NAME = "simulate_steps"
 
 
 def offer_steps(node: Node, step: Callable[[], Future], services: Services) -> bool:
-    """Offer the action under a node's name where its types are installed; whether it is.
+    """Offer the action under a node's name where its types are installed; return whether it is.
 
     Parameters
     ----------

@@ -85,7 +85,7 @@ class Services:
 
     @contextmanager
     def answering(self) -> Iterator[None]:
-        """While this lasts, `finish` waits: something is asked, and its answer has not been given."""
+        """Let `finish` wait while this lasts: something is asked, and its answer has not been given."""
         with self._all_answered:
             self._unanswered += 1
         try:
