@@ -225,14 +225,14 @@ class Solver(Part):
     max_step: PositiveTime | None = None
     """Longest adaptive step; by default a period of `output.rate`."""
     newton_tolerance: PositiveSpeed | None = None
-    """Newton ends with a correction of velocities, which it still takes, no larger than this; by default the speed that
-    makes 1/100 of `tolerance` (1e-4 with fixed steps) in the longest adaptive step (`max_step`)."""
+    """Newton's last correction of velocities is at most this; by default the speed that makes 1/100 of `tolerance`
+    (1e-4 with fixed steps) in the longest adaptive step (`max_step`)."""
     max_newton_iterations: Annotated[int, *whole(1, 10_000)] = 50
     """After which a step counts as failed and is shortened."""
     max_halvings: Annotated[int, *whole(0, 1000)] | None = None
-    """Of `dt`, for steps that fail; when the smallest one fails as well, the run stops and says why. By default 10;
-    adaptive steps may then be as short as a thousandth of the time in which sound passes an edge, or in which the
-    fastest point covers what `tolerance` allows."""
+    """Of `dt`, for steps that fail; when the smallest one fails as well, the run stops and says why. By default 10, and
+    adaptive steps may be as short as a thousandth of the time in which sound passes an edge, or in which the fastest
+    point covers what `tolerance` allows."""
 
 
 class Output(Part):

@@ -26,7 +26,8 @@ Made by `bilayer schema --markdown` from the classes that read scene files; do n
 - A *name* has letters, digits and single underscores, a letter first.
 - `NAME` and `N` in a path stand for the name or the number of an item, in `--set` as well:
   `--set rods.arm.stations=100`.
-- Where one of several mappings may stand, the key `type` or `shape` says which one it is."""
+- Where one of several mappings may stand, `type` or `shape` must say which one it is, unless it is the default."""
+TAGS = ("type", "shape")
 HEADER = ("key", "type", "unit", "default", "allowed", "description")
 
 
@@ -77,7 +78,7 @@ def _link(model: type[BaseModel]) -> str:
 
 def _tag(model: type[BaseModel]) -> tuple[str, Any] | None:
     """Return the key and value that distinguish this mapping from its alternatives."""
-    for name in ("type", "shape"):
+    for name in TAGS:
         field = model.model_fields.get(name)
         if field is not None and get_origin(field.annotation) is Literal:
             return name, get_args(field.annotation)[0]
@@ -86,7 +87,9 @@ def _tag(model: type[BaseModel]) -> tuple[str, Any] | None:
 
 def _choice(model: type[BaseModel]) -> str:
     tag = _tag(model)
-    return f", with `{tag[0]}: {tag[1]}`" if tag else ""
+    if not tag:
+        return ""
+    return f", with `{tag[0]}: {tag[1]}`{'' if model.model_fields[tag[0]].is_required() else ', the default'}"
 
 
 def _places() -> dict[type[BaseModel], list[str]]:
@@ -117,13 +120,11 @@ def _item(annotation: Any, model: type[BaseModel]) -> str:
 
 
 def _rows(model: type[BaseModel]) -> Iterator[tuple[str, ...]]:
-    tag = _tag(model)
-    names = sorted(model.model_fields, key=lambda name: tag is not None and name != tag[0])  # the tag first
-    for name in names:
-        field = model.model_fields[name]
-        kind = _kind_of_field(field)
-        note = "Says which mapping this is." if tag and name == tag[0] else notes(model).get(name, "")
-        yield (f"`{field.alias or name}`", kind.type, kind.unit, _default(field), kind.allowed, note)
+    tag, _ = _tag(model) or ("", None)
+    for name, field in model.model_fields.items():
+        if name != tag:
+            kind = _kind_of_field(field)
+            yield (f"`{field.alias or name}`", kind.type, kind.unit, _default(field), kind.allowed, notes(model)[name])
 
 
 def _default(field: FieldInfo) -> str:

@@ -86,8 +86,8 @@ class Pattern(Part):
     """Properties that each copy of a rod may have of its own, one entry for each copy."""
 
     stimuli: dict[Name, list[Name]] = {}
-    """By the name of a channel in the rod's eigenstrain laws: the channel that drives each copy instead. What is to
-    come later in one copy than in another has a channel of its own, whose schedule has the delay."""
+    """By the name of a channel in the rod's eigenstrain laws: the channel that drives each copy instead. For a
+    delay, give a copy a channel whose schedule has it."""
     gains: list[Number] | None = None
     """By which the gains of each copy's eigenstrain laws are multiplied; all 1 by default."""
     clamp_start: list[Name | None] | None = None

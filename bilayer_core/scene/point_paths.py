@@ -43,7 +43,7 @@ class PointPath(Path):
     """
     closed: bool = False
     """Whether the path leads from the last point back to the first, which may stand once more at the end: the rod has
-    no ends, and its last station is the first. Without normals its frame closes with the least twist.
+    no ends. Without normals its frame closes with the least twist.
     """
 
     @model_validator(mode="before")

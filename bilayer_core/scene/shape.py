@@ -20,7 +20,7 @@ class _Grained(Part):
 
     grain: Direction | None = None
     """Forward direction of friction for all that slides on it (`contact.friction.forward`, `backward`, `sideways`), in
-    the frame of the body or the obstacle, with which it turns; by default it has none."""
+    the frame of the body or the obstacle; none by default."""
 
 
 class _Plane(_Grained):
@@ -63,9 +63,7 @@ class _Cylinder(_Grained):
     rounding: NonNegativeLength = 0.0
     """Radius of its rims; the cylinder keeps its size."""
     rim_points: Annotated[int, *whole(3, MOST_POINTS)] = 64
-    """Points on each rim that feel other surfaces. Rolling down a slope of 0.3 rad, 64 lose 1 to 3 % of the
-    acceleration of a round one, 32 lose 13 %, 128 nothing.
-    """
+    """Points on each rim that feel other surfaces; rolling down a slope, 64 lose 1 to 3 % of the acceleration."""
 
     @model_validator(mode="after")
     def _check(self) -> _Cylinder:

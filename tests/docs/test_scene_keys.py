@@ -6,9 +6,9 @@ import pytest
 
 from bilayer_core.cli import main
 from bilayer_core.scene.key_notes import json_schema, notes, scene_models
+from bilayer_core.scene.key_tables import TAGS
 
 COMMAND = "python -m bilayer_core schema --markdown > docs/scene_keys.md"
-TAGS = {"type", "shape"}  # say which of several mappings stands there, and nothing else
 
 
 def written_page(root) -> str:
@@ -23,7 +23,7 @@ def test_the_page_of_keys_is_that_of_the_classes(root, capsys):
 
 @pytest.mark.parametrize("model", scene_models(), ids=lambda model: model.__name__)
 def test_every_key_has_a_description(model):
-    missing = model.model_fields.keys() - notes(model).keys() - TAGS
+    missing = model.model_fields.keys() - notes(model).keys() - set(TAGS)
     assert not missing, f"write a string below each of {sorted(missing)} in {model.__name__}, then: {COMMAND}"
     assert all(text.endswith(".") for text in notes(model).values())
 
@@ -47,6 +47,7 @@ def test_the_page_says_unit_range_default_and_alternatives(root):
         "| `eigenstrain` | [Eigenstrain](#eigenstrain) or list of [Eigenstrain](#eigenstrain) |  | none |",
         "| `torsion` | choice |  | `laminate` | `laminate`, `layers` |",
         "Stands at `bodies.NAME.motion`, with `type: guided`.",
+        "Stands at `rods.NAME.pattern`, with `type: rotation`, the default.",
     ):
         assert row in page
 
