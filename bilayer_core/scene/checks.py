@@ -210,7 +210,7 @@ def _surfaces(scene: SceneConfig) -> Iterator[Fault]:
 
 
 def _points(scene: SceneConfig) -> Iterator[Fault]:
-    """Check what point masses and loads are on, and where."""
+    """Yield the faults of point masses and loads: what they are on, and where."""
     for key, parts in (("masses", scene.masses), ("loads", scene.loads)):
         for index, part in enumerate(parts):
             if part.rod is not None:
