@@ -4,11 +4,23 @@ from __future__ import annotations
 
 from bilayer_core.engine.integrate import integrate
 from bilayer_core.engine.light_over_step import begin_light, end_light
-from bilayer_core.engine.linear.contact_columns import take_rod_contacts
+from bilayer_core.engine.linear.bordered_system import (
+    assemble_bodies,
+    count_border,
+    factor_border,
+    restrict_bodies,
+    solve_bordered,
+)
+from bilayer_core.engine.linear.closed_rods import move_joins_to_border
+from bilayer_core.engine.linear.contact_columns import move_to_border, take_rod_contacts
+from bilayer_core.engine.linear.planar_assembly import assemble_in_plane, gradient_in_plane, step_in_plane
 from bilayer_core.engine.linear.widths import SETS
 from bilayer_core.engine.observables import observe
 from bilayer_core.engine.step import treat_state, write_rest_strains
+from bilayer_core.forces.added_mass import fluid_momentum
+from bilayer_core.forces.contact_on_bodies import add_contact_to_bodies
 from bilayer_core.forces.force_register import TERMS
+from bilayer_core.forces.planar import add_elasticity_in_plane
 from bilayer_core.forces.rod_contact import bound_between_rods, find_rod_contacts
 from bilayer_core.kinematics.marker_lines import place_arrows, place_bars
 from bilayer_core.kinematics.node_frames import frames_at_nodes
@@ -21,15 +33,22 @@ FOR_FRAMES = frozenset(of.name for of in (observe, frames_at_nodes, place_bars, 
 def needed_pieces(model: Model) -> frozenset[str]:
     """Return the names of pieces that steps of a model can call.
 
-    Left out are forces that do not act, band solvers of other widths, and pieces for contact of rods and for light that
-    the scene lacks. A few of the others wait for conditions that a run may never meet.
+    Left out are forces that do not act, band solvers of other widths, and pieces for another dimension and for bodies,
+    contact of rods and light that the scene lacks. A few of the others wait for conditions that a run may never meet.
     """
-    width = model.solved_layout.half_bandwidth
-    left_out = {of.name for other, pieces in SETS.items() if other != width for of in pieces}
-    if "rod barrier" not in model.forces:
-        left_out |= {find_rod_contacts.name, bound_between_rods.name, take_rod_contacts.name}
-    if not model.light.exists:
-        left_out |= {begin_light.name, end_light.name}
+    width, joined = model.solved_layout.half_bandwidth, model.free_count > 0 or model.joins.exists
+    meets = "rod barrier" in model.forces
+    unused = (
+        *(pieces for other, pieces in SETS.items() if other != width),
+        () if meets else (find_rod_contacts, bound_between_rods, take_rod_contacts),
+        () if meets or joined else (move_to_border, SETS[width][-1], factor_border, solve_bordered, count_border),
+        () if model.free_count else (assemble_bodies, restrict_bodies, add_contact_to_bodies),
+        () if model.joins.exists else (move_joins_to_border,),
+        () if model.light.exists else (begin_light, end_light),
+        () if model.fluid.exists else (fluid_momentum,),
+        () if model.plane.exists else (assemble_in_plane, add_elasticity_in_plane, gradient_in_plane, step_in_plane),
+    )
+    left_out = {of.name for pieces in unused for of in pieces}
     waiting = [integrate, treat_state, write_rest_strains]
     for term in TERMS:
         if set(term.names) & set(model.forces):

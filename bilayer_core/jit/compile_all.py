@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Collection
 from contextlib import suppress
 from importlib import import_module
@@ -24,22 +25,12 @@ from bilayer_core.jit.piece import PIECES, Piece
 
 COMPLETE = "complete-{}"
 """Name of the file in the folder that says that all pieces are there for the present sources."""
-MOST_PROCESSES = 2
 _log = logging.getLogger(__name__)
 PACKAGES = Path(__file__).resolve().parents[2]
 PACKAGE = "bilayer_core"
 WORKER = f"{PACKAGE}.jit.worker"
 ENGINE = f"{PACKAGE}.engine"
 """Module that imports all that declare pieces."""
-LONGEST = {
-    "near_pairs",
-    "minimise_potential",
-    "make_step",
-    "add_bending",
-    "assemble_bodies",
-    "take_rod_contacts",
-}
-"""Pieces that take longest to compile, and so come first."""
 
 
 def is_complete() -> bool:
@@ -101,21 +92,23 @@ def compile_all(report: Callable[[int, int], None] | None = None) -> int:
 
 
 def _missing(needed: Collection[str] | None) -> list[str]:
-    """Return the names of pieces that the cache lacks, those first that take longest to compile."""
+    """Return the names of pieces that the cache lacks, in the order of their declaration."""
     import_module(ENGINE)
     asked = [piece for piece in own_pieces() if needed is None or piece.name in needed]
-    return sorted((piece.name for piece in asked if not holds(piece.file)), key=lambda name: name not in LONGEST)
+    return [piece.name for piece in asked if not holds(piece.file)]
 
 
 def _compile(names: list[str], report: Callable[[int, int], None] | None) -> None:
-    """Compile pieces in as many processes as there are cores for."""
+    """Compile pieces in as many processes as there are cores for.
+
+    One takes them from the front and one from the back: neighbours have kernels in common, which each process compiles
+    for itself.
+    """
     from bilayer_core.processes import usable_cores
 
-    left: queue.SimpleQueue[str] = queue.SimpleQueue()
-    for name in names:
-        left.put(name)
+    left = deque(names)
     done: queue.SimpleQueue[str | Exception] = queue.SimpleQueue()
-    workers = [_Worker(left, done) for _ in range(min(MOST_PROCESSES, usable_cores(), len(names)))]
+    workers = [_Worker(take, done) for take in (left.popleft, left.pop)[: min(usable_cores(), len(names))]]
     try:
         for worker in workers:
             worker.start()
@@ -141,9 +134,9 @@ def own_pieces() -> list[Piece]:
 class _Worker(threading.Thread):
     """A process that compiles what is left, and the thread that hands it name by name."""
 
-    def __init__(self, left: queue.SimpleQueue[str], done: queue.SimpleQueue[str | Exception]):
+    def __init__(self, take: Callable[[], str], done: queue.SimpleQueue[str | Exception]):
         super().__init__(daemon=True)
-        self._left, self._done = left, done
+        self._take, self._done = take, done
         self._process: subprocess.Popen | None = None
         self._ended = False
 
@@ -182,8 +175,8 @@ class _Worker(threading.Thread):
 
     def _next(self) -> str | None:
         try:
-            return self._left.get_nowait()
-        except queue.Empty:
+            return self._take()
+        except IndexError:
             return None
 
     @staticmethod

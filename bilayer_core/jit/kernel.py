@@ -18,6 +18,7 @@ EXACT = {"contract", "nsz"}
 PUBLIC = os.environ.get("BILAYER_JIT_PUBLIC", "0") != "0"
 """Switch that does without what `compiler.undocumented` describes."""
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"} | ({} if PUBLIC else {"_nrt": False})
+WITHOUT_ENTRIES: dict[str, bool] = {} if PUBLIC else {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 COMPILER = "bilayer_core.jit.compiler.machine_code"
 """Module that imports numba: for processes that compile something."""
 
@@ -42,12 +43,16 @@ class Kernel:
 
     @cached_property
     def compiled(self) -> Callable:
-        """Its dispatcher, as numba calls it."""
+        """Its dispatcher, as numba calls it, for pieces that it becomes part of."""
+        return import_module(COMPILER).dispatcher(self, **WITHOUT_ENTRIES)
+
+    @cached_property
+    def _for_interpreter(self) -> Callable:
         return import_module(COMPILER).dispatcher(self)
 
     def __call__(self, *arguments: Any) -> Any:
         """Run it for the interpreter, by which every process that does so compiles it: tests do."""
-        return self.compiled(*arguments)
+        return self._for_interpreter(*arguments)
 
 
 def kernel(function):

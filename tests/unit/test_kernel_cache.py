@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections import Counter
+from collections import Counter, deque
 
 import pytest
 
@@ -154,7 +154,6 @@ def test_workers_compile_this_package_and_not_one_of_its_name_where_they_start(t
     decoy.parent.mkdir()
     decoy.write_text("raise ImportError('not this one')")
     monkeypatch.chdir(tmp_path)
-    left, done = queue.SimpleQueue(), queue.SimpleQueue()
-    left.put("update_attached")
-    compile_all._Worker(left, done).run()
+    done = queue.SimpleQueue()
+    compile_all._Worker(deque(["update_attached"]).pop, done).run()
     assert done.get(timeout=1.0) == "update_attached"

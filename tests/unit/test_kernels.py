@@ -16,7 +16,7 @@ from bilayer_core.jit.piece import PIECES
 simulator = Simulator(load_scene(everything()), dt=1e-3, budget=True)
 simulator.run(0.003)
 simulator.contact_forces, simulator.curvatures
-compiled = [of.__name__ for of in gc.get_objects() if isinstance(of, Kernel) and "compiled" in vars(of)]
+compiled = [of.__name__ for of in gc.get_objects() if type(of) is Kernel and "compiled" in vars(of)]
 print(json.dumps([sorted(compiled), sorted(name for name, of in PIECES.items() if of.seconds)]))
 """
 

@@ -41,11 +41,11 @@ def set_target() -> None:
     numba.config.CPU_NAME, numba.config.CPU_FEATURES = target()
 
 
-def dispatcher(kernel: Kernel) -> Callable:
-    """Return a kernel as numba compiles it."""
+def dispatcher(kernel: Kernel, **options: bool) -> Callable:
+    """Return a kernel as numba compiles it, with further `options`."""
     declare_calls()
     set_target()
-    return numba.njit(**kernel.options)(kernel.py_func)
+    return numba.njit(**kernel.options, **options)(kernel.py_func)
 
 
 def compile_piece(piece: CalledByName) -> bytes:
