@@ -129,6 +129,7 @@ setup(
     package_data={
         "bilayer_core": ["py.typed"],
         "bilayer_sim_ros": ["py.typed"],
+        "bilayer_core.log.messages": ["ros_messages.txt"],
         "bilayer_core.verification.bench": ["references.json"],
     },
     data_files=data_files,
