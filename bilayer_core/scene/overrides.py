@@ -40,6 +40,22 @@ class Override:
         """Beginning of a message about the override."""
         return f"override {shortened(self.text)}"
 
+    def find(self, data: dict[str, Any]) -> tuple[Any, Any]:
+        """Return the mapping or list that holds the value in a complete scene, and its key or index there.
+
+        Raises
+        ------
+        SceneError
+            If the path does not exist; says what there is instead.
+        """
+        here, place = data, None
+        for depth, key in enumerate(self.keys):
+            here = here if place is None else here[place]
+            place = _place(here, key)
+            if place is None:
+                raise SceneError(f"{self.origin}: {_absent(here, key, '.'.join(self.keys[:depth]))}")
+        return here, place
+
     def apply(self, data: dict[str, Any]) -> None:
         """Change the value in a complete scene, what its file leaves out included, in place.
 
@@ -48,15 +64,8 @@ class Override:
         SceneError
             If the path does not exist; says what there is instead.
         """
-        here: Any = data
-        for depth, key in enumerate(self.keys):
-            place = _place(here, key)
-            if place is None:
-                raise SceneError(f"{self.origin}: {_absent(here, key, '.'.join(self.keys[:depth]))}")
-            if depth == len(self.keys) - 1:
-                here[place] = self.value
-            else:
-                here = here[place]
+        holder, place = self.find(data)
+        holder[place] = self.value
 
 
 def read_overrides(overrides: Overrides) -> list[Override]:

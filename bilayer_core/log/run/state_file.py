@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
+import tokenize
 import zipfile
 import zlib
 from pathlib import Path
@@ -25,6 +25,8 @@ LARGEST_LAYOUT = 1_000_000
 
 DAMAGED_ZIP = zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError
 """What `zipfile` raises for damaged files, and for those of later versions or with a password."""
+DAMAGED_ARRAY = KeyError, ValueError, OverflowError, MemoryError, tokenize.TokenError
+"""What numpy raises for damaged files."""
 
 
 def write_state(path: str | Path, state: np.ndarray, description: Description, force: bool = True) -> None:
@@ -66,11 +68,13 @@ def _read(path: Path, size: int) -> tuple[tuple, np.ndarray]:
         if path.stat().st_size > 8 * size + LARGEST_FILE:
             raise InputError(f"{path}: has {path.stat().st_size / 1e6:.3g} MB, more than a state of this scene takes")
         with zipfile.ZipFile(path) as members:
-            layout = read_json(_text(_array(members, "layout", LARGEST_LAYOUT)), f"{path}: layout")
-            state = _array(members, "state", 8 * size + LARGEST_LAYOUT)
+            for name, most in (("layout", LARGEST_LAYOUT), ("state", 8 * size + LARGEST_LAYOUT)):
+                _refuse_large(members.getinfo(f"{name}.npy"), most)
+        with np.load(path, allow_pickle=False) as arrays:
+            layout, state = read_json(_text(arrays["layout"]), f"{path}: layout"), arrays["state"]
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
-    except (KeyError, ValueError, *DAMAGED_ZIP) as error:
+    except (*DAMAGED_ARRAY, *DAMAGED_ZIP) as error:
         reason = " ".join(str(error).split())
         raise InputError(f"{path}: is not a saved state, or is damaged: {shortened(reason)}") from error
     if state.dtype != np.float64 or state.ndim != 1:
@@ -81,23 +85,12 @@ def _read(path: Path, size: int) -> tuple[tuple, np.ndarray]:
         raise InputError(f"{path}: layout: must be a list of names and shapes") from None
 
 
-def _array(members: zipfile.ZipFile, name: str, most: int) -> np.ndarray:
-    """Return an array of a ``.npz``; read at most `most` bytes of it, whatever sizes it declares."""
-    if members.getinfo(f"{name}.npy").compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-        raise ValueError(f"{name} is compressed in a way that numpy never uses")
-    with members.open(f"{name}.npy") as file:
-        data = file.read(most + 1)
-    if len(data) > most:
-        raise ValueError(f"{name} has more than {most} bytes, which no state of this scene has")
-    stream = io.BytesIO(data)
-    version = np.lib.format.read_magic(stream)
-    if version not in ((1, 0), (2, 0)):
-        raise ValueError(f"{name} has a header of an unknown version")
-    read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, _, dtype = read_header(stream)
-    if dtype.hasobject or math.prod(shape) * dtype.itemsize != len(data) - stream.tell():
-        raise ValueError(f"{name} has not the size that its header declares")
-    return np.frombuffer(data, dtype, math.prod(shape), stream.tell()).reshape(shape).copy()
+def _refuse_large(member: zipfile.ZipInfo, most: int) -> None:
+    """Raise ValueError if a member of a ``.npz`` declares more bytes than `most`: no more than declared are unpacked."""
+    if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise ValueError(f"{member.filename} is compressed in a way that numpy never uses")
+    if member.file_size > most:
+        raise ValueError(f"{member.filename} has more than {most} bytes, which no state of this scene has")
 
 
 def _text(array: np.ndarray) -> str:

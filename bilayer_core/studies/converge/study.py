@@ -19,7 +19,7 @@ from bilayer_core.model.plan import make_plan
 from bilayer_core.model.undamped_friction import unseen_vibrations
 from bilayer_core.processes import side_by_side
 from bilayer_core.scene.config import LARGEST_TOLERANCE, SceneConfig
-from bilayer_core.scene.loader import load_scene, parse_scene, scene_text
+from bilayer_core.scene.loader import load_scene, parse_scene, scene_content, scene_text
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.simulation.step_choice import choose_steps
 from bilayer_core.studies.converge.order import Estimate, estimate
@@ -253,7 +253,7 @@ def _make(
 def _run(text: str, overrides: Sequence[str], duration: float, start: np.ndarray | None) -> dict[str, float]:
     """Run the scene, in a process of its own."""
     base = parse_scene(text, "scene")
-    scene = load_scene(base.model_dump(mode="json", by_alias=True), overrides) if overrides else base
+    scene = load_scene(scene_content(base), overrides) if overrides else base
     simulator = Simulator(scene)
     if start is not None:
         simulator.load_state(start)

@@ -13,7 +13,7 @@ from scipy.special import chdtrc
 
 from bilayer_core.errors import BilayerError, InputError
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.scene.loader import load_scene
+from bilayer_core.scene.loader import load_scene, scene_content
 from bilayer_core.scene.overrides import Overrides
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.studies.fitting.data import Data, read_data, with_sigma
@@ -22,7 +22,7 @@ from bilayer_core.studies.fitting.fit_result import FitResult, Fitted
 from bilayer_core.studies.fitting.identify import refuse_undetermined, refuse_unseen, refuse_without_influence
 from bilayer_core.studies.fitting.intervals import Spread, spread_of
 from bilayer_core.studies.fitting.noise import Step, choose_steps, shares
-from bilayer_core.studies.fitting.parameters import Parameter, Parameters, content_of, read_parameters
+from bilayer_core.studies.fitting.parameters import Parameter, Parameters, read_parameters
 from bilayer_core.studies.fitting.runs import Runs, check_times, known_quantities
 
 Array = np.ndarray
@@ -99,8 +99,8 @@ def fit(
 def _configured(scene: Any, overrides: Overrides, dt: float | str | None) -> SceneConfig:
     config = scene if isinstance(scene, SceneConfig) else load_scene(scene, overrides)
     if isinstance(scene, SceneConfig) and overrides:
-        config = load_scene(content_of(scene), overrides)
-    return config if dt is None else load_scene(content_of(config), {"solver.dt": dt, "solver.tolerance": None})
+        config = load_scene(scene_content(scene), overrides)
+    return config if dt is None else load_scene(scene_content(config), {"solver.dt": dt, "solver.tolerance": None})
 
 
 def _refuse_few(data: Data, parameters: Sequence[Parameter]) -> None:

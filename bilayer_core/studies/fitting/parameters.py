@@ -18,7 +18,7 @@ import numpy as np
 from bilayer_core.errors import InputError, SceneError
 from bilayer_core.printable import shortened
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.scene.loader import load_scene
+from bilayer_core.scene.loader import load_scene, scene_content
 from bilayer_core.scene.overrides import Override, read_overrides
 
 Array = np.ndarray
@@ -136,12 +136,6 @@ def told(parameters: Sequence[Parameter], parts: Array) -> str:
     return ", ".join(f"{p.path} = {p.shown(p.value(u))}" for p, u in zip(parameters, parts.tolist(), strict=True))
 
 
-def content_of(scene: SceneConfig) -> dict[str, Any]:
-    """Return the complete content of a scene, to which overrides can be applied."""
-    content: dict[str, Any] = scene.model_dump(mode="json", by_alias=True)
-    return content
-
-
 def read_parameters(scene: SceneConfig, asked: Parameters) -> list[Parameter]:
     """Return the parameters of a scene as users give them.
 
@@ -152,7 +146,7 @@ def read_parameters(scene: SceneConfig, asked: Parameters) -> list[Parameter]:
     SceneError
         If there is no such key, with what there is instead, or the scene does not allow a bound.
     """
-    content = content_of(scene)
+    content = scene_content(scene)
     pairs = _pairs(asked)
     if not pairs:
         raise InputError(f"parameter: none is given; each {FORM}")
@@ -215,25 +209,8 @@ def _change(path: str, bound: Any) -> Override:
 
 def _at(content: dict[str, Any], change: Override) -> Any:
     """Return the value at a path in a scene, or raise SceneError if there is no such path."""
-    marked, mark = copy.deepcopy(content), object()
-    Override(change.keys, mark, change.text).apply(marked)
-    return _found(content, marked, mark)
-
-
-def _found(content: Any, marked: Any, mark: object) -> Any:
-    """Return the value in `content` at the place where `marked` has the mark; `_NOWHERE` if it has none."""
-    pairs = content.items() if isinstance(content, dict) else enumerate(content)
-    for key, held in pairs:
-        if marked[key] is mark:
-            return held
-        if isinstance(held, dict | list):
-            below = _found(held, marked[key], mark)
-            if below is not _NOWHERE:
-                return below
-    return _NOWHERE
-
-
-_NOWHERE = object()
+    holder, place = change.find(content)
+    return holder[place]
 
 
 def _in_scene(content: dict[str, Any], path: str, change: Override) -> float:
@@ -244,7 +221,7 @@ def _in_scene(content: dict[str, Any], path: str, change: Override) -> float:
         scene = load_scene(changed)
     except SceneError as error:
         raise SceneError(f"parameter {change.text}: {str(error).removeprefix('scene: ')}") from error
-    value = _at(content_of(scene), change)
+    value = _at(scene_content(scene), change)
     if isinstance(value, bool) or not isinstance(value, float) or not math.isfinite(value):
         raise InputError(f"parameter {change.text}: the scene takes no number there that can be varied")
     return value

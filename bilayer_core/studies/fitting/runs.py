@@ -11,11 +11,11 @@ from bilayer_core.log.messages.encoders import SOLVER_LABELS
 from bilayer_core.log.run.quantities import Entry, entries
 from bilayer_core.observed.frame import Frame
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.scene.loader import load_scene
+from bilayer_core.scene.loader import load_scene, scene_content
 from bilayer_core.scene.overrides import Override
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.studies.fitting.data import Column, Data
-from bilayer_core.studies.fitting.parameters import Parameter, content_of, told
+from bilayer_core.studies.fitting.parameters import Parameter, told
 
 Array = np.ndarray
 Outcome = Array | BilayerError
@@ -62,7 +62,7 @@ class Runs:
     """
 
     def __init__(self, scene: SceneConfig, parameters: Sequence[Parameter], data: Data):
-        self._content, self._parameters, self._data = content_of(scene), parameters, data
+        self._content, self._parameters, self._data = scene_content(scene), parameters, data
         self._simulator: Simulator | None = None
         self._outcomes: dict[bytes, Outcome] = {}
         self.count = 0
