@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,24 +21,26 @@ if TYPE_CHECKING:
 
 DIFFERS = 1
 """Exit code if a run does not come out as it is in the log, or the log is not whole."""
-
-
+OF_VERIFY = ("tolerance", "derived", "json")
+OF_FROM = ("set", "stimulus", "load", "duration", "log", "rrd", "vary")
+OF_ROS = ("rate", "loop")
+"""Options that belong to one of the ways to replay; ``--force`` and ``--quiet`` belong to the first two."""
 THENCE = "From there on; null: its schedule."
 MANY = "Many runs, each with another value of stimulus.CHANNEL, load.NAME or a key of the scene, overlaid in one --rrd."
 
 
 @click.command(cls=Verb)
-@click.argument("log", metavar="LOG.mcap")
+@click.argument("path", metavar="LOG.mcap")
 @click.option("--verify", "verifies", is_flag=True, help="Simulate the run again, and compare every state in the log.")
 @click.option("--tolerance", type=float, metavar="X", help="Part of the longest rod by which positions may differ.")
 @click.option("--derived", is_flag=True, help="For --verify: compare markers, energies and the like as well.")
 @json_option("Write what came of it")
 @click.option("--from", "moment", type=Duration(from_zero=True), metavar="T", help="Go on from this time of the log.")
 @set_option
-@click.option("--stimulus", "stimuli", multiple=True, metavar="CHANNEL=VALUE", help=THENCE)
-@click.option("--load", "loads", multiple=True, metavar="NAME=FACTOR", help=THENCE)
+@click.option("--stimulus", multiple=True, metavar="CHANNEL=VALUE", help=THENCE)
+@click.option("--load", multiple=True, metavar="NAME=FACTOR", help=THENCE)
 @click.option("--duration", type=Duration(), help="How long to go on; default: to the end of the log's run.")
-@click.option("--log", "new", metavar="NEW.mcap", help="Write a log of what comes then.")
+@click.option("--log", metavar="NEW.mcap", help="Write a log of what comes then.")
 @click.option("--rrd", metavar="FILE.rrd", help="Write a rerun recording of what comes then.")
 @click.option("--vary", metavar="NAME=FROM:TO:COUNT", help=MANY)
 @click.option("--ros", "publishes", is_flag=True, help="Publish its messages on ROS 2: the node replay_node.")
@@ -46,26 +48,7 @@ MANY = "Many runs, each with another value of stimulus.CHANNEL, load.NAME or a k
 @click.option("--loop", is_flag=True, help="Begin again at the end, for --ros.")
 @click.option("--force", is_flag=True, help="Replace existing files.")
 @click.option("--quiet", is_flag=True, help="Neither progress nor summary.")
-def replay(
-    log: str,
-    verifies: bool,
-    tolerance: float | None,
-    derived: bool,
-    json_file: str | None,
-    moment: float | None,
-    overrides: tuple[str, ...],
-    stimuli: tuple[str, ...],
-    loads: tuple[str, ...],
-    duration: float | None,
-    new: str | None,
-    rrd: str | None,
-    vary: str | None,
-    publishes: bool,
-    rate: float | None,
-    loop: bool,
-    force: bool,
-    quiet: bool,
-) -> int:
+def replay(path: str, verifies: bool, moment: float | None, publishes: bool, **options: Any) -> int:
     """Make the run of a log again: to verify it (--verify), or another one from an instant on (--from). Or publish
     its messages on ROS 2 (--ros).
 
@@ -78,57 +61,50 @@ def replay(
             "replay: say either --verify, to compare the run with its log, or --from T, to go on from T, or --ros, to "
             "publish its messages"
         )
-    changes = {"--set": overrides, "--stimulus": stimuli, "--load": loads, "--duration": duration, "--log": new}
-    changes |= {"--rrd": rrd, "--vary": vary}
+    options["set"], options["json"] = options.pop("overrides"), options.pop("json_file")
     if publishes:
-        others = {
-            **changes,
-            "--tolerance": tolerance,
-            "--derived": derived,
-            "--json": json_file,
-            "--force": force,
-            "--quiet": quiet,
-        }
-        given = [option for option, value in others.items() if value is not None and value is not False and value != ()]
-        if given:
-            raise InputError(f"{given[0]}: is not for --ros")
-        become_replay_node(log, rate, loop)
-    for option, value in (("--rate", rate), ("--loop", loop)):
-        if value is not None and value is not False:
-            raise InputError(f"{option}: is for --ros")
-    read_head(Path(log))  # what is no log is told before kernels are compiled
+        _refuse(options, (*OF_FROM, *OF_VERIFY, "force", "quiet"), "is not for --ros")
+        become_replay_node(path, options["rate"], options["loop"])
+    _refuse(options, OF_ROS, "is for --ros")
+    read_head(Path(path))  # what is no log is told before kernels are compiled
     if verifies:
-        given = [option for option, value in changes.items() if value]
-        if given:
-            raise InputError(f"{given[0]}: is for --from; --verify makes the run as it was")
-        return _verify(log, tolerance, derived, json_file, force, quiet)
-    for option, value in (("--tolerance", tolerance), ("--derived", derived or None), ("--json", json_file)):
-        if value is not None:
-            raise InputError(f"{option}: is for --verify")
-    changed = _values("--stimulus", stimuli), _values("--load", loads)
-    if vary is not None:
-        if rrd is None or new is not None:
+        _refuse(options, OF_FROM, "is for --from; --verify makes the run as it was")
+        return _verify(path, options)
+    _refuse(options, OF_VERIFY, "is for --verify")
+    for name in ("stimulus", "load"):
+        options[name] = _values(f"--{name}", options[name])
+    if options["vary"] is not None:
+        if options["rrd"] is None or options["log"] is not None:
             raise InputError("--vary: its runs go into one recording; name that by --rrd, and no --log")
-        _branch_out(log, moment, vary, overrides, *changed, duration, rrd, force, quiet)
+        _branch_out(path, moment, options)
     else:
-        _go_on(log, moment, overrides, *changed, duration, new, rrd, force, quiet)
+        _go_on(path, moment, options)
     return 0
 
 
-def _verify(log: str, tolerance: float | None, derived: bool, json_file: str | None, force: bool, quiet: bool) -> int:
+def _refuse(options: dict[str, Any], names: tuple[str, ...], reason: str) -> None:
+    """Raise InputError with a reason if one of some options is given."""
+    for name in names:
+        value = options[name]
+        if value is not None and value is not False and value != ():
+            raise InputError(f"--{name}: {reason}")
+
+
+def _verify(path: str, options: dict[str, Any]) -> int:
     from bilayer_core.runs.replay import verify
 
+    tolerance, derived = options["tolerance"], options["derived"]
     if tolerance is not None and not tolerance > 0.0:
         raise InputError(f"--tolerance: {tolerance} is not allowed; it must be a part of the longest rod above 0")
     if tolerance is not None and derived:
         raise InputError(
             "--derived: compares messages byte by byte, and --tolerance lets states differ; give one of them"
         )
-    with json_to(json_file, force) as write_json:
-        compile_kernels(quiet)
-        found = verify(log, tolerance, derived)
+    with json_to(options["json"], options["force"]) as write_json:
+        compile_kernels(options["quiet"])
+        found = verify(path, tolerance, derived)
         write_json(json.dumps(_as_json(found), indent=2))
-        if not quiet:
+        if not options["quiet"]:
             _tell(found)
     return 0 if found.passed else DIFFERS
 
@@ -196,40 +172,27 @@ def _values(option: str, texts: tuple[str, ...]) -> dict[str, float | None]:
     return found
 
 
-def _go_on(
-    log: str,
-    moment: float,
-    overrides: tuple[str, ...],
-    stimuli: dict[str, float | None],
-    loads: dict[str, float | None],
-    duration: float | None,
-    new: str | None,
-    rrd: str | None,
-    force: bool,
-    quiet: bool,
-) -> None:
+def _go_on(path: str, moment: float, options: dict[str, Any]) -> None:
     from bilayer_core.cli.report import summary_lines
     from bilayer_core.log.file.mcap_log import McapRecorder
     from bilayer_core.runs.replay import branch
 
     interrupt, observers = Interrupt(), []
-    simulator, inputs = branch(log, moment, overrides, stimuli, loads)
-    if new is not None:
-        if Path(new).resolve() == Path(log).resolve():
-            raise InputError(f"--log: {new} is the log that is gone on from; choose another name")
-        output = simulator.scene.output
-        observers.append(McapRecorder(new, output.rate, output.marker_rate, force))
-    if rrd is not None:
+    simulator, inputs = branch(path, moment, options["set"], options["stimulus"], options["load"])
+    output, begin = simulator.scene.output, simulator.time
+    if options["log"] is not None:
+        if Path(options["log"]).resolve() == Path(path).resolve():
+            raise InputError(f"--log: {options['log']} is the log that is gone on from; choose another name")
+        observers.append(McapRecorder(options["log"], output.rate, output.marker_rate, options["force"]))
+    if options["rrd"] is not None:
         from bilayer_core.view.rerun_view import RrdRecorder
 
-        observers.append(RrdRecorder(rrd, simulator.scene.output.rate, force))
-    if duration is None:
-        duration = _time_left(log, simulator.time)
-    compile_kernels(quiet)
-    begin = simulator.time
-    with interrupt, progress_bar(simulator.scene.name, begin, begin + duration, quiet) as show:
+        observers.append(RrdRecorder(options["rrd"], output.rate, options["force"]))
+    duration = options["duration"] or _time_left(path, begin)
+    compile_kernels(options["quiet"])
+    with interrupt, progress_bar(simulator.scene.name, begin, begin + duration, options["quiet"]) as show:
         simulator.run(duration, observers=observers, interrupted=interrupt.grant, progress=show, inputs=inputs)
-    if not quiet:
+    if not options["quiet"]:
         for line in summary_lines({**simulator.summary(), "duration": duration}, set()):
             say(line)
     if interrupt.granted:
@@ -246,37 +209,26 @@ def _time_left(log: str, time: float) -> float:
     return left
 
 
-def _branch_out(
-    log: str,
-    moment: float,
-    vary: str,
-    overrides: tuple[str, ...],
-    stimuli: dict[str, float | None],
-    loads: dict[str, float | None],
-    duration: float | None,
-    rrd: str,
-    force: bool,
-    quiet: bool,
-) -> None:
+def _branch_out(path: str, moment: float, options: dict[str, Any]) -> None:
     from bilayer_core.log.file.output_paths import check_output_path
     from bilayer_core.log.run.log_reader import read_state
     from bilayer_core.runs.branches import Varied, run_branches
     from bilayer_core.view.rerun_view import require_rerun, write_branches
 
     require_rerun()
-    check_output_path(rrd, force, ".rrd")
-    varied, begin = Varied.read(vary), float(read_state(log, moment)[0][0])
-    until = begin + (_time_left(log, begin) if duration is None else duration)
-    compile_kernels(quiet)
-    common = {"overrides": overrides, "stimuli": stimuli, "loads": loads}
+    check_output_path(options["rrd"], options["force"], ".rrd")
+    varied, begin = Varied.read(options["vary"]), float(read_state(path, moment)[0][0])
+    until = begin + (options["duration"] or _time_left(path, begin))
+    compile_kernels(options["quiet"])
+    common = {"overrides": options["set"], "stimuli": options["stimulus"], "loads": options["load"]}
     branches = []
-    with count_bar(len(varied.values), quiet) as show:
-        for of in run_branches(log, moment, varied, until, **common):
+    with count_bar(len(varied.values), options["quiet"]) as show:
+        for of in run_branches(path, moment, varied, until, **common):
             branches.append(of)
             show(f"{varied.name} = {of.value:g}")
-    write_branches(branches, varied.name, rrd, force)
-    if not quiet:
-        say(f"{len(branches)} branches from t = {begin:g} s to {until:g} s by {varied.name}: {rrd}")
+    write_branches(branches, varied.name, options["rrd"], options["force"])
+    if not options["quiet"]:
+        say(f"{len(branches)} branches from t = {begin:g} s to {until:g} s by {varied.name}: {options['rrd']}")
         for of in branches:
             if of.stopped:
                 say(f"  {varied.name} = {of.value:g} stopped at t = {of.run.times[-1]:g} s: {of.stopped}")
