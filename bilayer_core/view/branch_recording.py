@@ -12,10 +12,9 @@ import rerun.blueprint as rrb
 
 from bilayer_core.log.run.run_data import RunData
 from bilayer_core.view.drawable import refuse_undrawable
-from bilayer_core.view.recording_layout import TIMELINE, Curves, Plot, whole
+from bilayer_core.view.recording_layout import TIMELINE, Curves, Plot, robot_view, whole
 from bilayer_core.view.rrd_writer import log_bodies, log_obstacles, plain_text, send_bodies
 from bilayer_core.view.scales import Scales, choose_scales
-from bilayer_core.view.theme import BACKGROUND
 
 FIRST, LAST = np.array([70, 150, 255]), np.array([255, 120, 50])
 """Colours of the smallest and the largest value."""
@@ -122,15 +121,7 @@ def _send_curves(recording: rr.RecordingStream, number: str, label: str, run: Ru
 
 
 def _blueprint(name: str, scales: Scales, curves: Curves, legend: bool) -> rrb.Blueprint:
-    robot = rrb.Spatial3DView(
-        name="Branches",
-        origin="world",
-        background=BACKGROUND,
-        line_grid=False,
-        eye_controls=rrb.EyeControls3D(
-            kind=rrb.Eye3DKind.Orbital, position=scales.eye, look_target=scales.target, eye_up=(0.0, 0.0, 1.0)
-        ),
-    )
+    robot = robot_view(scales.eye, scales.target, follows=False, name="Branches")
     plots = [curves.view(Plot(curve, f"{title} by {name}"), legend) for curve, title in CURVES.items()]
     text = rrb.TextDocumentView(name="Run", origin="summary")
     left = rrb.Vertical(robot, text, row_shares=[9, 2])

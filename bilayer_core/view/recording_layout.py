@@ -188,10 +188,10 @@ def _robot(run: RunData, scales: Scales) -> rrb.Spatial3DView:
     return robot_view(eye, target, follows)
 
 
-def robot_view(eye: np.ndarray, target: np.ndarray, follows: bool) -> rrb.Spatial3DView:
+def robot_view(eye: np.ndarray, target: np.ndarray, follows: bool, name: str = "Robot") -> rrb.Spatial3DView:
     """Return the view of the robot from an eye, which may follow it, towards a target [m], shape (3,)."""
     return rrb.Spatial3DView(
-        name="Robot",
+        name=name,
         origin="world",
         background=BACKGROUND,
         line_grid=False,

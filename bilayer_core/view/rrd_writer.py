@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -126,9 +126,7 @@ class RunSender:
         self._send_strands(run, colouring)
         send_bodies(recording, run, BODIES)
         middles = middles_of(run)
-        for part in _chunks(len(middles)):  # none while no shape has come: a viewer ends where it meets no rows
-            columns = rr.Points3D.columns(positions=middles[part]).partition([1] * len(middles[part]))
-            recording.send_columns(MIDDLE, _time(run.shape_times[part]), columns)
+        send_columns(recording, MIDDLE, run.shape_times, lambda part: rr.Points3D.columns(positions=middles[part]))
         self._send_joints(run)
         self._send_arrows("world/contact_forces", ARROW_COLOUR, contact_arrows(run, scales), scales)
         for name, arrows in reactions.items():
@@ -140,38 +138,32 @@ class RunSender:
 
     def _send_strands(self, run: RunData, colouring: Colouring) -> None:
         """Send layers as ribbons, or where their cross-sections are not known, their nodes as points."""
-        shade = np.where(np.arange(geometry.CORNERS) < geometry.WIDE_CORNERS, 1.0, SIDE_SHADE)[:, None]
         for layer, rows in zip(run.description.layers, self._rows, strict=True):
-            positions, frames = run.positions[:, layer.nodes], run.material_frames[:, rows]
-            values = colouring.values(run, layer)
-            for part in _chunks(len(run.shape_times)):
-                if not has_sections(layer):
-                    columns = rr.Points3D.columns(
-                        positions=positions[part].reshape(-1, 3),
-                        colors=_bytes(colouring.colours(values[part])[..., :3]).reshape(-1, 3),
-                    ).partition([positions.shape[1]] * len(positions[part]))
-                    self._recording.send_columns(_strand(layer), _time(run.shape_times[part]), columns)
-                    continue
-                vertices = geometry.ribbon_vertices(layer, positions[part], frames[part])
-                colours = _bytes(colouring.colours(values[part])[:, :, None, :3] * shade)
-                sizes = [positions.shape[1] * geometry.CORNERS] * len(vertices)
-                self._recording.send_columns(
-                    _strand(layer),
-                    _time(run.shape_times[part]),
-                    rr.Mesh3D.columns(
-                        vertex_positions=vertices.reshape(-1, 3), vertex_colors=colours.reshape(-1, 3)
-                    ).partition(sizes),
-                )
+            self._send_layer(run, layer, run.material_frames[:, rows], colouring)
+
+    def _send_layer(self, run: RunData, layer: Strand, frames: np.ndarray, colouring: Colouring) -> None:
+        positions, values = run.positions[:, layer.nodes], colouring.values(run, layer)
+        shade = np.where(np.arange(geometry.CORNERS) < geometry.WIDE_CORNERS, 1.0, SIDE_SHADE)[:, None]
+        nodes = positions.shape[1]
+
+        def points(part: slice) -> rr.ComponentColumnList:
+            colours = _bytes(colouring.colours(values[part])[..., :3])
+            columns = rr.Points3D.columns(positions=positions[part].reshape(-1, 3), colors=colours.reshape(-1, 3))
+            return columns.partition([nodes] * len(colours))
+
+        def ribbon(part: slice) -> rr.ComponentColumnList:
+            vertices = geometry.ribbon_vertices(layer, positions[part], frames[part]).reshape(-1, 3)
+            colours = _bytes(colouring.colours(values[part])[:, :, None, :3] * shade)
+            columns = rr.Mesh3D.columns(vertex_positions=vertices, vertex_colors=colours.reshape(-1, 3))
+            return columns.partition([nodes * geometry.CORNERS] * len(colours))
+
+        send_columns(self._recording, _strand(layer), run.shape_times, ribbon if has_sections(layer) else points)
 
     def _send_joints(self, run: RunData) -> None:
         """Send joints and guides, each on the body that carries it."""
         for joint in run.description.joints:
-            if joint.body < 0:
-                continue
-            for part in _chunks(len(run.times)):
-                poses = run.body_positions[part, joint.body], run.body_quaternions[part, joint.body]
-                moved = rr.Transform3D.columns(translation=poses[0], quaternion=poses[1])
-                self._recording.send_columns(f"world/{joint.name}", _time(run.times[part]), moved)
+            if joint.body >= 0:
+                _send_poses(self._recording, f"world/{joint.name}", run, joint.body)
 
     def _send_arrows(self, path: str, colour: tuple, arrows: Arrows, scales: Scales) -> None:
         if path not in self._declared:
@@ -179,15 +171,14 @@ class RunSender:
             looks = rr.Arrows3D.from_fields(colors=colour, radii=0.005 * scales.size)
             self._recording.log(path, looks, static=True)
         shown = np.linalg.norm(arrows.forces, axis=2) > arrows.shown
-        for part in _chunks(len(arrows.times)):
+
+        def columns(part: slice) -> rr.ComponentColumnList:
             which = shown[part]
-            self._recording.send_columns(
-                path,
-                _time(arrows.times[part]),
-                rr.Arrows3D.columns(
-                    origins=arrows.origins[part][which], vectors=arrows.forces[part][which] * arrows.metres_per_unit
-                ).partition(which.sum(axis=1)),
-            )
+            vectors = arrows.forces[part][which] * arrows.metres_per_unit
+            found = rr.Arrows3D.columns(origins=arrows.origins[part][which], vectors=vectors)
+            return found.partition(which.sum(axis=1))
+
+        send_columns(self._recording, path, arrows.times, columns)
 
     def _send_series(self, run: RunData) -> None:
         """Send curves: stimulus, forces of contact and of rods on each body, heights, energies, the solver's health."""
@@ -229,13 +220,13 @@ class RunSender:
         """Send the events of a run as text."""
         if not run.events:
             return
-        colours = [EVENT_COLOURS.get(event.name, PLAIN_COLOUR) for event in run.events]
         columns = rr.TextLog.columns(
             text=[event.text for event in run.events],
             level=[LEVEL_NAMES.get(event.level, "INFO") for event in run.events],
-            color=colours,
+            color=[EVENT_COLOURS.get(event.name, PLAIN_COLOUR) for event in run.events],
         )
-        self._recording.send_columns(EVENTS, _time(np.array([event.time for event in run.events])), columns)
+        times = rr.TimeColumn(TIMELINE, duration=[event.time for event in run.events])
+        self._recording.send_columns(EVENTS, [times], columns)
 
     def _send_curve(self, group: str, name: str, times: np.ndarray, values: np.ndarray) -> None:
         path, known = f"plots/{group}/{entity_name(name)}", self._curves.setdefault(group, [])
@@ -243,8 +234,7 @@ class RunSender:
             colour = CHANNEL_COLOURS[len(known) % len(CHANNEL_COLOURS)]
             self._recording.log(path, rr.SeriesLines(names=name, colors=colour, widths=2), static=True)
             known.append(name)
-        for part in _chunks(len(times)):
-            self._recording.send_columns(path, _time(times[part]), rr.Scalars.columns(scalars=values[part]))
+        send_columns(self._recording, path, times, lambda part: rr.Scalars.columns(scalars=values[part]))
 
 
 def _strand(layer: Strand) -> str:
@@ -252,12 +242,15 @@ def _strand(layer: Strand) -> str:
     return f"world/strands/{layer.name}"
 
 
-def _chunks(count: int):
-    return (slice(first, min(first + CHUNK, count)) for first in range(0, count, CHUNK))
-
-
-def _time(times: np.ndarray) -> list[rr.TimeColumn]:
-    return [rr.TimeColumn(TIMELINE, duration=times)]
+def send_columns(
+    recording: rr.RecordingStream, path: str, times: np.ndarray, columns: Callable[[slice], rr.ComponentColumnList]
+) -> None:
+    """Send what `columns` makes of each part of the times [s]; nothing if there is none, since a viewer ends where it
+    meets no rows.
+    """
+    for first in range(0, len(times), CHUNK):
+        part = slice(first, first + CHUNK)
+        recording.send_columns(path, [rr.TimeColumn(TIMELINE, duration=times[part])], columns(part))
 
 
 def _health(solver: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -314,11 +307,14 @@ def log_bodies(recording: rr.RecordingStream, description: Description, scales: 
 def send_bodies(recording: rr.RecordingStream, run: RunData, under: str) -> None:
     """Send the poses of bodies."""
     for index, body in enumerate(run.description.bodies):
-        for part in _chunks(len(run.times)):
-            recording.send_columns(
-                f"{under}/{body.name}",
-                _time(run.times[part]),
-                rr.Transform3D.columns(
-                    translation=run.body_positions[part, index], quaternion=run.body_quaternions[part, index]
-                ),
-            )
+        _send_poses(recording, f"{under}/{body.name}", run, index)
+
+
+def _send_poses(recording: rr.RecordingStream, path: str, run: RunData, body: int) -> None:
+    """Send the poses of a body for what is drawn on it."""
+    positions, quaternions = run.body_positions[:, body], run.body_quaternions[:, body]
+
+    def columns(part: slice) -> rr.ComponentColumnList:
+        return rr.Transform3D.columns(translation=positions[part], quaternion=quaternions[part])
+
+    send_columns(recording, path, run.times, columns)
