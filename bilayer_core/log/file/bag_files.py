@@ -45,7 +45,7 @@ class BagFiles:
 
     def encodings(self, topic: str) -> set[str]:
         """Return how the messages of a topic are encoded: ``cdr`` for those of ROS 2."""
-        return {of.encoding for part in self.parts for of in part.channels.values() if of.topic == topic}
+        return {of.message_encoding for part in self.parts for of in part.channels.values() if of.topic == topic}
 
     def spans(self) -> dict[str, tuple[int, int, int]]:
         """Return number of messages, and first and last time of logging [ns], of each topic that has some."""

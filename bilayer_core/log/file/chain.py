@@ -24,8 +24,7 @@ from typing import Self
 import numpy as np
 
 from bilayer_core.log.file.log_chunks import LogFile
-from bilayer_core.log.file.log_opening import open_log
-from bilayer_core.log.file.log_records import METADATA, content, read_metadata, walk
+from bilayer_core.log.file.log_opening import damage_told, metadata_records
 from bilayer_core.log.messages.cdr import decoded, read_float64_multi_array, seconds_text
 from bilayer_core.log.messages.topics import INPUTS, LOG_NAMESPACE
 from bilayer_core.observed.frame import Description
@@ -212,15 +211,12 @@ def _read_links(path: Path, scene_text: str) -> tuple[Chain, list[Link], Link | 
     """Read the beginning of a log's hash, the links in its metadata in the order of messages, and its end."""
     head: dict[str, dict[str, str]] = {}
     links, end = [], None
-    with open_log(path) as file:
-        for place in walk(file):
-            if place.opcode != METADATA:
-                continue
-            name, values = read_metadata(content(file, place), (*HASHED, CHAIN, END))
+    with damage_told(path):
+        for name, values in metadata_records(path, (*HASHED, CHAIN, END)):
             if name == CHAIN:
                 links.append(Link.of(values))
             elif name == END:
                 end = Link.of(values)
-            elif name in HASHED:
+            else:
                 head[name] = values
     return Chain(scene_text, head), sorted(filter(None, links), key=lambda link: link.messages), end

@@ -5,9 +5,8 @@ from __future__ import annotations
 from array import array
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 
@@ -35,18 +34,11 @@ from bilayer_core.log.file.log_summary import Summary, read_summary
 from bilayer_core.log.messages.topics import LOG_NAMESPACE
 from bilayer_core.printable import shortened
 
+if TYPE_CHECKING:
+    from mcap.records import Channel
+
 MOST_BARE = 1 << 20
 """Of messages that stand outside of chunks, as many as are read at once [bytes]."""
-
-
-@dataclass(frozen=True)
-class LogChannel:
-    """A topic in a file: its full name and ROS type, how its messages are encoded, and what rosbag2 is told of it."""
-
-    topic: str
-    type: str
-    encoding: str
-    metadata: dict[str, str]
 
 
 class LogFile:
@@ -61,8 +53,6 @@ class LogFile:
     path : Path
     namespace : str
         What the names of a run's topics begin with.
-    channels : dict
-        Number -> `LogChannel`.
     has_index : bool
         Whether the file was finished with an index.
     topics : dict
@@ -78,7 +68,6 @@ class LogFile:
 
     def __init__(self, path: str | Path):
         self.path = Path(path)
-        self.channels: dict[int, LogChannel] = {}
         self._definitions = Definitions()
         self._chunks = ChunkTable()
         with open_log(self.path) as file:
@@ -88,7 +77,12 @@ class LogFile:
                 self._take(summary, file)
             else:
                 self._scan(file)
-        self.topics = {channel.topic: channel.type for channel in self.channels.values()}
+        self.topics = {channel.topic: self._type_of(channel) for channel in self.channels.values()}
+
+    @property
+    def channels(self) -> dict[int, Channel]:
+        """Topics in the file by their numbers."""
+        return self._definitions.channels
 
     def times(self, topic: str) -> np.ndarray:
         """Return when each message of a topic was logged [ns], in the order of the file."""
@@ -133,8 +127,6 @@ class LogFile:
     def _take(self, summary: Summary, file: BinaryIO) -> None:
         """Take the places of messages from the file's own index."""
         self._definitions = summary.definitions
-        for channel in summary.definitions.channels.values():
-            self._add_channel(channel)
         for place, length in summary.chunks():
             self._chunks.begin(place)
             for index in walk(file, place.end):
@@ -184,20 +176,18 @@ class LogFile:
             if opcode == MESSAGE:
                 number, _, time, _ = MESSAGE_HEAD.unpack_from(inside, start)
                 times[number].append(time)
-            elif opcode == SCHEMA:
+            elif opcode in (SCHEMA, CHANNEL):
                 self._definitions.take(opcode, inside[start:end])
-            elif opcode == CHANNEL:
-                self._add_channel(self._definitions.take(opcode, inside[start:end]))
         self._chunks.forget()
         for number, of in times.items():
             self._chunks.add(number, np.asarray(of))
 
-    def _add_channel(self, channel) -> None:
+    def _type_of(self, channel: Channel) -> str:
+        """Return the type of a topic, or nothing where the file does not say."""
         schema = self._definitions.schemas.get(channel.schema_id)
         if channel.schema_id and schema is None:
             raise InputError(f"{self.path}: is damaged: the type of {shortened(channel.topic)} is missing")
-        name = "" if schema is None else schema.name  # of number 0: the file does not say
-        self.channels[channel.id] = LogChannel(channel.topic, name, channel.message_encoding, channel.metadata)
+        return "" if schema is None else schema.name
 
     def _add_index(self, data: bytes) -> bool:
         """Take a message index of the last chunk; False if it speaks of a channel that is not known yet."""

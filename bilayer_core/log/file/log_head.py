@@ -8,7 +8,7 @@ from typing import BinaryIO
 
 from bilayer_core import DISTRIBUTION
 from bilayer_core.errors import InputError
-from bilayer_core.log.file.log_opening import open_log
+from bilayer_core.log.file.log_opening import metadata_records, open_log
 from bilayer_core.log.file.log_records import (
     ATTACHMENT,
     METADATA,
@@ -52,9 +52,7 @@ def is_log(path: Path) -> bool:
     InputError
         If it cannot be read, or is no MCAP file.
     """
-    with open_log(path) as file:
-        records = (read_metadata(content(file, place), _OWN) for place in walk(file) if place.opcode == METADATA)
-        return any(_OWN.get(name) in values for name, values in records)
+    return any(_OWN[name] in values for name, values in metadata_records(path, _OWN))
 
 
 def read_head(path: Path) -> Head:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
 from bilayer_core.errors import InputError
-from bilayer_core.log.file.log_records import MAGIC, DamagedChunk
+from bilayer_core.log.file.log_records import MAGIC, METADATA, DamagedChunk, content, read_metadata, walk
 
 CONVERT = (
     "convert the bag with `ros2 bag convert -i BAG -o OUT.yaml`, where OUT.yaml says "
@@ -32,6 +32,22 @@ def open_log(path: Path) -> Iterator[BinaryIO]:
             yield file
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+
+
+def metadata_records(path: Path, wanted: Collection[str]) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield the name and the content of each metadata record of some names, in the order of the file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is no MCAP file, or is damaged.
+    """
+    with open_log(path) as file:
+        for place in walk(file):
+            if place.opcode == METADATA:
+                name, values = read_metadata(content(file, place), wanted)
+                if name in wanted:
+                    yield name, values
 
 
 @contextmanager

@@ -268,7 +268,7 @@ class Definitions:
         self.channels: dict[int, Channel] = {}
         self._size = 0
 
-    def take(self, opcode: int, data: bytes) -> Schema | Channel:
+    def take(self, opcode: int, data: bytes) -> None:
         """Take a schema or a channel from the content of its record.
 
         Raises
@@ -288,7 +288,6 @@ class Definitions:
                 most = f"{MOST_DEFINITIONS / 1e6:g} MB"
                 raise DamagedChunk(f"its types and topics have more than {most}, the most that are read")
             known[record.id] = record
-        return record
 
 
 _PER_ENTRY = 200

@@ -174,11 +174,7 @@ class McapRecorder:
         ----------
         told : Input
         """
-        self._refuse_unstarted()
-        if self._patience is None:
-            self._put(told)
-        elif self._failure is None:
-            self._backlog.add(told)
+        self._keep(told)
 
     def _put_in_time(self, frame: Frame) -> bool:
         """Wait no more for a disk for which one wait was in vain, until it has caught up."""
@@ -191,11 +187,15 @@ class McapRecorder:
         ----------
         event : Event
         """
+        self._keep(event)
+
+    def _keep(self, item: Input | Event) -> None:
+        """Hand over what is never left out."""
         self._refuse_unstarted()
         if self._patience is None:
-            self._put(event)
+            self._put(item)
         elif self._failure is None:
-            self._backlog.add(event)
+            self._backlog.add(item)
 
     def close(self, complete: bool, termination: str = "") -> None:
         """Write what is left and finish the file.

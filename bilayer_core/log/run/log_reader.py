@@ -16,8 +16,7 @@ from bilayer_core.errors import InputError
 from bilayer_core.log.file.chain import END, STATE, Link
 from bilayer_core.log.file.log_chunks import LogFile
 from bilayer_core.log.file.log_head import Head, read_head
-from bilayer_core.log.file.log_opening import open_log
-from bilayer_core.log.file.log_records import METADATA, content, read_metadata, walk
+from bilayer_core.log.file.log_opening import metadata_records
 from bilayer_core.log.messages.cdr import NANOSECONDS, decoded, nanoseconds, read_float64_multi_array
 from bilayer_core.log.messages.topics import INPUTS
 from bilayer_core.log.run.bag import Bag, BagRun, choose_run, split_address
@@ -276,9 +275,7 @@ def read_messages(path: str | Path, topics: set[str] | None = None) -> Iterator[
 
 def _read_metadata(path: Path) -> dict[str, dict[str, str]]:
     """Return the metadata records by name that stand after the messages."""
-    with open_log(path) as file:
-        records = (read_metadata(content(file, place), LATE) for place in walk(file) if place.opcode == METADATA)
-        return {name: values for name, values in records if name in LATE}
+    return dict(metadata_records(path, LATE))
 
 
 def _lacks(head: Head, file: LogFile, metadata: dict[str, dict[str, str]]) -> tuple[str, ...]:

@@ -86,7 +86,7 @@ def _read(path: Path, size: int) -> tuple[tuple, np.ndarray]:
 
 
 def _refuse_large(member: zipfile.ZipInfo, most: int) -> None:
-    """Raise ValueError if a member of a ``.npz`` declares more bytes than `most`: no more than declared are unpacked."""
+    """Raise ValueError if a member of a ``.npz`` declares more bytes than `most`; no more than those are unpacked."""
     if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise ValueError(f"{member.filename} is compressed in a way that numpy never uses")
     if member.file_size > most:
