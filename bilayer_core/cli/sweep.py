@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import ExitStack
 from functools import wraps
 from pathlib import Path
 from typing import Any
@@ -123,7 +122,7 @@ def sweep(
     from bilayer_core.studies.sweeps.journal import Journal
     from bilayer_core.studies.sweeps.open_processes import Processes
     from bilayer_core.studies.sweeps.run_sweep import read_sweep, run_missing
-    from bilayer_core.studies.sweeps.sweep_result import write_table
+    from bilayer_core.studies.sweeps.sweep_result import TABLE
 
     directory = Path(out)
     read = read_sweep(file, directory, run_code=not listed)
@@ -137,18 +136,14 @@ def sweep(
         there = len(journal.keys() & keys)
         if resume and not quiet:
             say(f"{there} of {len(keys)} runs are there", err=True)
-        try:
-            with ExitStack() as stack, runs_bar(count_of(read.spec), there, quiet) as show:
-                for rows in run_missing(read, journal, stack, Processes(**processes), teller(quiet)):
-                    for row in rows:
-                        show(row.outcome.value)
-        finally:
-            table = write_table(journal, keys, read.about, directory)
-        result = read.result(journal)
+        with runs_bar(count_of(read.spec), there, quiet) as show:
+            result = run_missing(
+                read, journal, directory, Processes(**processes), lambda row: show(row.outcome.value), teller(quiet)
+            )
         say(", ".join(f"{count} {outcome}" for outcome, count in result.outcomes.items()) or "no runs")
         for line in reasons(result):
             say(f"  {line}")
-        say(f"wrote {table}")
+        say(f"wrote {directory / TABLE}")
         if plotted:
             from bilayer_core.studies.sweeps.plots import draw
 

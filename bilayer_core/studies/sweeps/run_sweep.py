@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -252,44 +252,40 @@ def sweep(
     read = read_sweep(spec, directory, functions)
     processes = Processes(workers, scheduler, security, dashboard)
     with Journal(directory, read.content, resume=resume, force=force) as journal:
-        try:
-            with ExitStack() as stack:
-                for rows in run_missing(read, journal, stack, processes):
-                    for row in rows:
-                        if progress is not None:
-                            progress(row)
-        finally:
-            if directory is not None:
-                write_table(journal, read.keys(), read.about, directory)
-        return read.result(journal)
+        return run_missing(read, journal, directory, processes, progress)
 
 
 def run_missing(
-    sweep: Sweep, journal: Journal, stack: ExitStack, processes: Processes, tell: Any = None
-) -> Iterator[list[Row]]:
-    """Make the runs of a sweep that a journal lacks; what comes is in the journal when it is handed on.
+    sweep: Sweep,
+    journal: Journal,
+    directory: Path | None,
+    processes: Processes,
+    progress: Callable[[Row], None] | None = None,
+    tell: Callable[[Engine], None] | None = None,
+) -> SweepResult:
+    """Make the runs of a sweep that a journal lacks, and write its table; what comes is in the journal when it is told.
 
     Parameters
     ----------
-    stack : ExitStack
-        Which holds the processes.
-    tell : callable, optional
-        Called with the `Engine` before the first run.
+    directory : Path, optional
+        Of the table.
+    progress, tell : callable, optional
+        Called with each row, and with the `Engine` before the first run.
     """
     there = journal.keys()
     missing = (point for point in sweep.points() if point.key not in there)
     first = next(missing, None)
-    if first is None:
-        return
-    ensure_compiled()
-    engine: Engine = stack.enter_context(open_engine(sweep.job, processes, sweep.spec.limits.memory))
-    if tell is not None:
-        tell(engine)
-    for rows in engine.run(_with_first(first, missing)):
-        journal.add(rows)
-        yield rows
-
-
-def _with_first(first: Point, rest: Iterator[Point]) -> Iterator[Point]:
-    yield first
-    yield from rest
+    try:
+        if first is not None:
+            ensure_compiled()
+            with open_engine(sweep.job, processes, sweep.spec.limits.memory) as engine:
+                if tell is not None:
+                    tell(engine)
+                for rows in engine.run(chain([first], missing)):
+                    journal.add(rows)
+                    for row in rows if progress is not None else ():
+                        progress(row)
+    finally:
+        if directory is not None:
+            write_table(journal, sweep.keys(), sweep.about, directory)
+    return sweep.result(journal)
