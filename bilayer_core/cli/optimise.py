@@ -31,14 +31,11 @@ def optimise(
     file: str,
     maximise: str | None,
     minimise: str | None,
-    trials: int,
-    seed: int,
     out: str,
     processes: dict[str, Any],
-    resume: bool,
-    force: bool,
     plotted: bool,
     quiet: bool,
+    **settings: Any,
 ) -> int:
     """Search for the values of the parameters of SWEEP with the best METRIC (docs/sweeps.md).
 
@@ -59,17 +56,14 @@ def optimise(
         raise click.UsageError("give --maximise METRIC or --minimise METRIC")
     require("optimise", "dask", "distributed", "optuna", "pyarrow", *(["matplotlib"] if plotted else []))
     compile_kernels(quiet)
-    with runs_bar(trials, 0, quiet) as show:
+    with runs_bar(settings["trials"], 0, quiet) as show:
         optimum = search.optimise(
             file,
             maximise or minimise or "",
             largest=maximise is not None,
-            trials=trials,
-            seed=seed,
             out=out,
             **processes,
-            resume=resume,
-            force=force,
+            **settings,
             progress=lambda row: show(row.outcome.value),
             tell=teller(quiet),
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -10,7 +11,8 @@ from bilayer_core.cli.options import Duration, Verb
 from bilayer_core.cli.terminal import say
 
 NODE = "/bilayer_sim"
-FOLLOWING = {"node": "--node", "bind": "--bind", "port": "--port", "serve": "--serve"}
+FOLLOWING = ("node", "bind", "port", "serve")
+"""Options of a run that goes on."""
 
 
 @click.command(cls=Verb, old_spellings={"--time": "--at"})
@@ -32,32 +34,19 @@ FOLLOWING = {"node": "--node", "bind": "--bind", "port": "--port", "serve": "--s
     help="What the colours of rods say: axial strain (default), curvature, or the pressure of contact.",
 )
 @click.option("--force", is_flag=True, help="Replace existing files.")
-def view(
-    file: str | None,
-    follow: bool,
-    node: str | None,
-    serve: bool,
-    bind: str | None,
-    port: int | None,
-    web: bool,
-    save: str | None,
-    picture: str | None,
-    moment: float | None,
-    colour: str | None,
-    force: bool,
-) -> None:
+def view(file: str | None, follow: bool, **options: Any) -> None:
     """Show a run in rerun; with --follow one that goes on."""
     from bilayer_core.errors import InputError
     from bilayer_core.log.file.output_paths import check_output_path
     from bilayer_core.view.colouring import STRAIN
 
-    if moment is not None and picture is None:
+    picture, save, colour = options["picture"], options["save"], options["colour"]
+    if options["moment"] is not None and picture is None:
         raise InputError("--at: is the time of a picture; give --screenshot FILE.png as well")
-    given = {"node": node, "bind": bind, "port": port, "serve": serve}
     if not follow:
-        for name, value in given.items():
-            if value:
-                raise InputError(f"{FOLLOWING[name]}: is for a run that goes on; give --follow as well")
+        for name in FOLLOWING:
+            if options[name]:
+                raise InputError(f"--{name}: is for a run that goes on; give --follow as well")
         if file is None:
             raise InputError("say what to show: FILE.mcap, FILE.rrd, or --follow for a node that runs")
     if file and file.endswith(".rrd"):
@@ -71,55 +60,46 @@ def view(
             raise InputError(f"--save: {file} is a rerun recording already")
     for path, suffix in ((save, ".rrd"), (picture, ".png")):
         if path:
-            check_output_path(path, force, suffix)
+            check_output_path(path, options["force"], suffix)
     if follow:
         if picture:
             raise InputError("--screenshot: is of a run that is over; leave out --follow")
-        if file and node:
+        if file and options["node"]:
             raise InputError(f"--node: is followed without a log; leave out {file}")
-        _follow(file, node or NODE, bind, port, serve, web, save, colour or STRAIN)
+        _follow(file, options)
         return
+    colour = colour or STRAIN
     from bilayer_core.view.rerun_view import convert_log, open_browser, open_viewer, screenshot
 
     if save:
-        convert_log(file, save, colour or STRAIN)
+        convert_log(file, save, colour)
         say(f"recording  {save}")
     if picture:
-        screenshot(save or file, picture, moment, colour or STRAIN)
+        screenshot(save or file, picture, options["moment"], colour)
         say(f"picture    {picture}")
     if save or picture:
         return
-    if web:
-        open_browser(file, say, colour or STRAIN)
+    if options["web"]:
+        open_browser(file, say, colour)
     else:
-        open_viewer(file, colour or STRAIN)
+        open_viewer(file, colour)
 
 
-def _follow(
-    file: str | None,
-    node: str,
-    bind: str | None,
-    port: int | None,
-    serve: bool,
-    web: bool,
-    save: str | None,
-    colour: str,
-) -> None:
+def _follow(file: str | None, options: dict[str, Any]) -> None:
     """Follow a log here, or a node as a node that takes this process over."""
     if file is None:
         from bilayer_core.cli.nodes import become_follower
 
-        options = {"--bind": bind, "--port": port, "--save": save, "--colour": colour}
-        flags = {"--serve": serve, "--web": web}
-        become_follower(node, options, flags)
+        given = {f"--{name}": options[name] for name in ("bind", "port", "save", "colour")}
+        become_follower(options["node"] or NODE, given, {f"--{name}": options[name] for name in ("serve", "web")})
     from bilayer_core.view.follow import Serving, follow_log
 
     serving = Serving(
-        bind=bind or Serving.bind,
-        port=port,
-        window=not serve,
-        web=web,
-        save=Path(save) if save else None,
-        colour=colour,
+        bind=options["bind"] or Serving.bind,
+        port=options["port"],
+        window=not options["serve"],
+        web=options["web"],
+        save=Path(options["save"]) if options["save"] else None,
+        colour=options["colour"] or Serving.colour,
     )
     follow_log(file, serving, say)

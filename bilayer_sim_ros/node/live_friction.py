@@ -13,6 +13,7 @@ from bilayer_core.simulation.friction_changes import refuse_friction
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_sim_ros.control.pending_changes import Commands
 from bilayer_sim_ros.node.parameters import FRICTION, FRICTION_OF_SCENE, Value
+from bilayer_sim_ros.services.requests import answered
 
 KEYS = dict(zip(FRICTION, COEFFICIENTS, strict=True))
 """Parameter -> key of `contact.friction`."""
@@ -63,6 +64,4 @@ class LiveFriction:
             self._tell(changed_setting(simulator.time, f"contact.friction.{key} is {acting:g}"))
 
         self._commands.ask((name, ""), act)
-        answer: Future = Future()
-        answer.set_result("")
-        return answer
+        return answered("")

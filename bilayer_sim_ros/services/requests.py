@@ -6,11 +6,19 @@ import queue
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
+from typing import Any
 
 from bilayer_core.errors import InputError
 
 Action = Callable[[Future], None]
 """Does what is asked and sets the future's result, at once or later."""
+
+
+def answered(value: Any) -> Future:
+    """Return a future that has its result already."""
+    future: Future = Future()
+    future.set_result(value)
+    return future
 
 
 class Requests:

@@ -13,6 +13,7 @@ from rclpy.type_support import check_is_valid_srv_type
 from bilayer_core.errors import BilayerError, InputError
 from bilayer_core.log.messages.cdr import NANOSECONDS
 from bilayer_sim_ros.replay.player import Player
+from bilayer_sim_ros.services.requests import answered
 from bilayer_sim_ros.services.trigger_services import Service
 
 
@@ -37,7 +38,7 @@ def rosbag2_services(node: Node, player: Player) -> list[Service]:
     def play(_: Any) -> Future:
         # As rosbag2's player answers while it is in playback, which this one is as long as it lives.
         node.get_logger().warning("~/play: dismissed, as the log is being played; ~/seek goes to another time")
-        return _done(False)
+        return answered(False)
 
     def seek(time: Time) -> Future:
         return player.seek(time.sec * NANOSECONDS + time.nanosec)
@@ -64,7 +65,7 @@ def rosbag2_services(node: Node, player: Player) -> list[Service]:
         Service("resume", srv.Resume, lambda _: player.resume(), nothing),
         Service("toggle_paused", srv.TogglePaused, lambda _: player.toggle_paused(), nothing),
         Service("is_paused", srv.IsPaused, lambda _: player.is_paused(), paused),
-        Service("get_rate", srv.GetRate, lambda _: _done(player.rate), rate),
+        Service("get_rate", srv.GetRate, lambda _: answered(player.rate), rate),
         Service("set_rate", srv.SetRate, lambda request: player.set_rate(request.rate), success),
         Service("play", srv.Play, play, success),
         Service("play_next", srv.PlayNext, lambda _: player.play_next(), success),
@@ -72,9 +73,3 @@ def rosbag2_services(node: Node, player: Player) -> list[Service]:
         Service("seek", srv.Seek, lambda request: seek(request.time), success),
         Service("stop", srv.Stop, lambda _: player.end(), nothing),
     ]
-
-
-def _done(value: Any) -> Future:
-    future: Future = Future()
-    future.set_result(value)
-    return future

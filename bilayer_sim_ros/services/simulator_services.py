@@ -22,6 +22,7 @@ from bilayer_core.printable import shortened
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_sim_ros.control.subscriptions import LONGEST_WARNING
 from bilayer_sim_ros.services.entities import Entities
+from bilayer_sim_ros.services.requests import answered
 from bilayer_sim_ros.services.trigger_services import Service
 
 UNSUPPORTED, OK, NOT_FOUND, FAILED = 0, 1, 2, 4
@@ -92,8 +93,8 @@ def simulator_services(
 def _services(srv: Any, worker: Worker, entities: Entities, quit: Callable[[str], None]) -> list[Service]:
     def state_now(_: Any) -> Future:
         if not worker.begun:
-            return _done((LOADING_WORLD, Result()))
-        return _then(worker.look(state_of), lambda state: _done((state, Result())))
+            return answered((LOADING_WORLD, Result()))
+        return _then(worker.look(state_of), lambda state: answered((state, Result())))
 
     def set_state(request: Any) -> Future:
         if request.state.state == QUITTING:  # also while kernels are compiled
@@ -104,24 +105,24 @@ def _services(srv: Any, worker: Worker, entities: Entities, quit: Callable[[str]
     def reset(request: Any) -> Future:
         both = SCOPE_TIME | SCOPE_STATE
         if request.scope and request.scope & both != both:
-            return _done(Result(UNSUPPORTED, NOT_SCOPE))
+            return answered(Result(UNSUPPORTED, NOT_SCOPE))
         return _then(worker.reset(), _all_right)
 
     def look_at(names: list[str]) -> Future:
         return worker.look(lambda simulator, _: (entities.states(simulator, names), Result()))
 
     def names_of(request: Any) -> Future:
-        return _done(_filtered(entities, request.filters))
+        return answered(_filtered(entities, request.filters))
 
     def states(request: Any) -> Future:
         names, result = _filtered(entities, request.filters)
-        return look_at(names) if result.code == OK else _done(([], result))
+        return look_at(names) if result.code == OK else answered(([], result))
 
     def one_state(request: Any) -> Future:
         if request.entity not in entities.names:
             known = shortened(", ".join(entities.names), LONGEST_WARNING)
             text = f"there is no entity '{shortened(request.entity)}'; there are {known}"
-            return _done(([], Result(NOT_FOUND, text)))
+            return answered(([], Result(NOT_FOUND, text)))
         return look_at([request.entity])
 
     def write_states(response: Any, future: Future) -> None:
@@ -147,10 +148,10 @@ def _services(srv: Any, worker: Worker, entities: Entities, quit: Callable[[str]
             response.state.state = state
 
     def refuse_state(request: Any) -> Future:
-        return _done(Result(UNSUPPORTED, NOT_STATE.format(shortened(request.entity))))
+        return answered(Result(UNSUPPORTED, NOT_STATE.format(shortened(request.entity))))
 
     return [
-        Service("get_simulator_features", srv.GetSimulatorFeatures, lambda _: _done(None), write_features),
+        Service("get_simulator_features", srv.GetSimulatorFeatures, lambda _: answered(None), write_features),
         Service("get_simulation_state", srv.GetSimulationState, state_now, write_state),
         Service("set_simulation_state", srv.SetSimulationState, set_state, _result_into),
         Service("reset_simulation", srv.ResetSimulation, reset, _result_into),
@@ -172,16 +173,16 @@ def state_of(simulator: Simulator, paused: bool) -> int:
 def _change(worker: Worker, wished: int, present: int) -> Future:
     """Go from a state to another one."""
     if wished == present:
-        return _done(Result(ALREADY_THERE, "it is in that state already"))
+        return answered(Result(ALREADY_THERE, "it is in that state already"))
     if wished == PLAYING:
         return _then(worker.resume(), _all_right)
     if wished == PAUSED and present == STOPPED:
-        return _done(Result(WRONG_TRANSITION, "what is stopped cannot be paused: play or step first"))
+        return answered(Result(WRONG_TRANSITION, "what is stopped cannot be paused: play or step first"))
     if wished == PAUSED:
         return _then(worker.pause(), _all_right)
     if wished == STOPPED:
         return _then(worker.pause(), lambda _: _then(worker.reset(), _all_right))
-    return _done(Result(UNSUPPORTED, f"there is no state {wished} here: the world is the scene, which stays"))
+    return answered(Result(UNSUPPORTED, f"there is no state {wished} here: the world is the scene, which stays"))
 
 
 def _steps(worker: Worker, count: int) -> Future:
@@ -203,7 +204,7 @@ def _steps(worker: Worker, count: int) -> Future:
             ended = worker.step()
         ended.add_done_callback(go_on)
 
-    go_on(_done(None))
+    go_on(answered(None))
     return whole
 
 
@@ -232,13 +233,7 @@ def _result_into(response: Any, future: Future) -> Any:
 
 
 def _all_right(_: Any) -> Future:
-    return _done(Result())
-
-
-def _done(value: Any) -> Future:
-    future: Future = Future()
-    future.set_result(value)
-    return future
+    return answered(Result())
 
 
 def _then(first: Future, following: Callable[[Any], Future]) -> Future:
