@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from bilayer_core.scene.faults import ROUNDING, Fault, refuse_all
+from bilayer_core.scene.faults import ROUNDING, Fault
 from bilayer_core.scene.mechanism import Sliding, Turning, resistance
 from bilayer_core.scene.part import AngularVelocity, Direction, Name, Part, Point, Velocity
 from bilayer_core.scene.schedule import faults_of_times
@@ -56,10 +56,8 @@ class Free(Part):
         """Describe the body in a few words."""
         return "free body" if self.mass > 0.0 else "junction without mass"
 
-    @model_validator(mode="after")
-    def _check(self) -> Free:
-        refuse_all("Free", faults_of_inertia(self))
-        return self
+    def _faults(self) -> list[Fault]:
+        return faults_of_inertia(self)
 
 
 class Guided(Part):
@@ -102,10 +100,26 @@ class Guided(Part):
         }
         return f"guided body, {' and '.join(way for way, has in ways.items() if has)}"
 
-    @model_validator(mode="after")
-    def _check(self) -> Guided:
-        refuse_all("Guided", faults_of_guided(self))
-        return self
+    def _faults(self) -> list[Fault]:
+        """Return the faults of a guided motion: no way to move, settings without meaning, impossible inertia."""
+        faults: list[Fault] = []
+        if self.axis is None and not self.turns:
+            faults.append((("axis",), None, "must be given, or `hinge`, or `pinned`: else it does not move"))
+        if self.axis is None and self.speed:
+            faults.append((("speed",), self.speed, "must be left out: without an axis it does not slide"))
+        if self.hinge is not None and self.pinned:
+            faults.append((("hinge",), self.hinge, "must be left out: a pinned body turns in all directions"))
+        if self.hinge is None and self.angular_speed:
+            faults.append((("angular_speed",), self.angular_speed, "must be left out: without a hinge it has no axis"))
+        if self.hinge is None and self.turning is not None:
+            found = self.turning.model_dump(exclude_defaults=True)
+            faults.append((("turning",), found, "must be left out: without a hinge it has no axis"))
+        if self.axis is None and self.sliding is not None:
+            found = self.sliding.model_dump(exclude_defaults=True)
+            faults.append((("sliding",), found, "must be left out: without an axis it does not slide"))
+        if self.inertia is not None and not self.turns:
+            faults.append((("inertia",), self.inertia, "must be left out: it does not turn"))
+        return [*faults, *faults_of_inertia(self)]
 
 
 class Prescribed(Part):
@@ -144,9 +158,8 @@ class Prescribed(Part):
         """True if the body ever leaves its pose at the start, or may leave it."""
         return self.controlled or any(any(part) for part in (*self.displacements, *self.rotations))
 
-    @model_validator(mode="after")
-    def _check(self) -> Prescribed:
-        faults = []
+    def _faults(self) -> list[Fault]:
+        faults: list[Fault] = []
         if self.displacements or not self.rotations:
             faults += faults_of_times(self.times, ("displacements",), self.displacements)
         if self.rotations:
@@ -157,8 +170,7 @@ class Prescribed(Part):
         ):
             if values and any(values[0]):
                 faults.append(((key, 0), values[0], f"must be [0, 0, 0]: `{start}` is where the body starts"))
-        refuse_all("Prescribed", faults)
-        return self
+        return faults
 
 
 class ContactPoint(Part):
@@ -198,28 +210,6 @@ class Body(Part):
     """Points by which the body itself touches surfaces."""
     drag: BodyDrag | None = None
     """Of the fluid on a free or guided body; none by default."""
-
-
-def faults_of_guided(motion: Guided) -> list[Fault]:
-    """Return the faults of a guided motion: no way to move, settings without meaning, impossible inertia."""
-    faults: list[Fault] = []
-    if motion.axis is None and not motion.turns:
-        faults.append((("axis",), None, "must be given, or `hinge`, or `pinned`: else it does not move"))
-    if motion.axis is None and motion.speed:
-        faults.append((("speed",), motion.speed, "must be left out: without an axis it does not slide"))
-    if motion.hinge is not None and motion.pinned:
-        faults.append((("hinge",), motion.hinge, "must be left out: a pinned body turns in all directions"))
-    if motion.hinge is None and motion.angular_speed:
-        faults.append((("angular_speed",), motion.angular_speed, "must be left out: without a hinge it has no axis"))
-    if motion.hinge is None and motion.turning is not None:
-        found = motion.turning.model_dump(exclude_defaults=True)
-        faults.append((("turning",), found, "must be left out: without a hinge it has no axis"))
-    if motion.axis is None and motion.sliding is not None:
-        found = motion.sliding.model_dump(exclude_defaults=True)
-        faults.append((("sliding",), found, "must be left out: without an axis it does not slide"))
-    if motion.inertia is not None and not motion.turns:
-        faults.append((("inertia",), motion.inertia, "must be left out: it does not turn"))
-    return [*faults, *faults_of_inertia(motion)]
 
 
 def faults_of_inertia(motion: Free | Guided) -> list[Fault]:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
 from bilayer_core.printable import shortened
 from bilayer_core.scene import checks
 from bilayer_core.scene.body import Body
 from bilayer_core.scene.channel_range import value_in_range
-from bilayer_core.scene.faults import Fault, refuse, refuse_all
+from bilayer_core.scene.faults import Fault, refuse
 from bilayer_core.scene.joint import Joint
 from bilayer_core.scene.load import Load, PointMass
 from bilayer_core.scene.part import AngularVelocity, Direction, Name, Part, Velocity
@@ -88,10 +88,18 @@ class Stimulus(Part):
     """Makes the channel the brightness of a light with a direction. Layers then follow it with a lag, element by
     element."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Stimulus:
-        refuse_all("Stimulus", faults_of_range(self))
-        return self
+    def _faults(self) -> list[Fault]:
+        """Return the faults of a channel's range and of the values that its schedule takes."""
+        low, high = self.minimum, self.maximum
+        if self.light is not None and low != 0.0:
+            return [(("minimum",), low, "must be 0 for a light: that is what layers in the dark see")]
+        if high <= low:
+            return [(("maximum",), high, f"must be above `minimum` ({low:g})")]
+        return [
+            (("schedule", *key), value, f"must lie in the range of the channel, {low:g} to {high:g} [{self.unit}]")
+            for key, value in self.schedule.points().items()
+            if value_in_range(value, low, high) is None
+        ]
 
 
 class Friction(Part):
@@ -303,21 +311,5 @@ class SceneConfig(Part):
 
     __str__ = __repr__
 
-    @model_validator(mode="after")
-    def _check(self) -> SceneConfig:
-        refuse_all("SceneConfig", checks.faults_of_scene(self))
-        return self
-
-
-def faults_of_range(stimulus: Stimulus) -> list[Fault]:
-    """Return the faults of a channel's range and of the values that its schedule takes."""
-    low, high = stimulus.minimum, stimulus.maximum
-    if stimulus.light is not None and low != 0.0:
-        return [(("minimum",), low, "must be 0 for a light: that is what layers in the dark see")]
-    if high <= low:
-        return [(("maximum",), high, f"must be above `minimum` ({low:g})")]
-    return [
-        (("schedule", *key), value, f"must lie in the range of the channel, {low:g} to {high:g} [{stimulus.unit}]")
-        for key, value in stimulus.schedule.points().items()
-        if value_in_range(value, low, high) is None
-    ]
+    def _faults(self) -> list[Fault]:
+        return checks.faults_of_scene(self)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
-from bilayer_core.scene.faults import one_of, refuse_all
+from bilayer_core.scene.faults import Fault, one_of, refuse_all
+from bilayer_core.scene.part import Part
 from bilayer_core.scene.units import (
     NonNegativeLength,
     NonNegativeTime,
@@ -54,10 +55,10 @@ def _gain_or_law(schema: dict[str, Any]) -> None:
     schema["anyOf"] = [{"required": ["gain"]}, {"required": ["law"]}]
 
 
-class Eigenstrain(BaseModel):
+class Eigenstrain(Part):
     """Free strain of a layer: gain times the stimulus, which the material follows with a first-order lag."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True, json_schema_extra=_gain_or_law)
+    model_config = ConfigDict(json_schema_extra=_gain_or_law)
 
     stimulus: str
     """One of the channels in `stimuli`."""
@@ -93,14 +94,11 @@ class Eigenstrain(BaseModel):
             numbers = {key: number for key, number in numbers.items() if not key.startswith("time_constant")}
         return handler({**numbers, **data, "law": None})
 
-    @model_validator(mode="after")
-    def _check(self) -> Eigenstrain:
+    def _faults(self) -> Iterator[Fault]:
         directions = ("time_constant_rising", "time_constant_falling")
         given = [key for key in directions if getattr(self, key) is not None]
         if self.time_constant is not None and given:
-            demand = f"must be left out where `{given[0]}` is given"
-            refuse_all("Eigenstrain", [(("time_constant",), self.time_constant, demand)])
-        return self
+            yield ("time_constant",), self.time_constant, f"must be left out where `{given[0]}` is given"
 
     @property
     def lags(self) -> tuple[float, float]:

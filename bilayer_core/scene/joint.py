@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import model_validator
 
-from bilayer_core.scene.faults import ROUNDING, Fault, refuse_all
+from bilayer_core.scene.faults import ROUNDING, Fault
 from bilayer_core.scene.mechanism import Sliding, Turning
 from bilayer_core.scene.part import Direction, Name, Part, Point
 from bilayer_core.scene.units import real
@@ -45,35 +44,29 @@ class Joint(Part):
     torsional_stiffness: PositiveTorsionRate | None = None
     """Moment by the angle between directions that it keeps; by default likewise of the stiffest bend."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Joint:
-        refuse_all("Joint", faults_of_joint(self))
-        return self
-
-
-def faults_of_joint(joint: Joint) -> list[Fault]:
-    """Return the faults of a joint: keys that do not go with its type or each other, and bodies that are one."""
-    kind = f"a {joint.type}" + (" joint" if joint.type == "universal" else "")
-    faults: list[Fault] = []
-    if joint.bodies[0] == joint.bodies[1]:
-        faults.append((("bodies",), list(joint.bodies), "must be two different bodies"))
-    for key, value, allowed in (
-        ("axis", joint.axis, joint.type in WITH_AXIS),
-        ("second_axis", joint.second_axis, joint.type == "universal"),
-    ):
-        if allowed and value is None:
-            faults.append(((key,), None, f"must be given for {kind}"))
-        if not allowed and value is not None:
-            faults.append(((key,), list(value), f"must be left out: {kind} has none"))
-    if joint.axis is not None and joint.second_axis is not None:
-        if abs(np.dot(joint.axis, joint.second_axis)) > ROUNDING:
-            faults.append((("second_axis",), list(joint.second_axis), "must be perpendicular to `axis`"))
-    if joint.type == "pin" and joint.torsional_stiffness is not None:
-        faults.append((("torsional_stiffness",), joint.torsional_stiffness, "must be left out: a pin turns freely"))
-    if joint.turning is not None and joint.type not in TURNS:
-        found = joint.turning.model_dump(exclude_defaults=True)
-        faults.append((("turning",), found, f"must be left out: {kind} has no axis about which alone it turns"))
-    if joint.sliding is not None and joint.type not in SLIDES:
-        found = joint.sliding.model_dump(exclude_defaults=True)
-        faults.append((("sliding",), found, f"must be left out: {kind} does not slide"))
-    return faults
+    def _faults(self) -> list[Fault]:
+        """Return the faults of a joint: keys that do not go with its type or each other, and bodies that are one."""
+        kind = f"a {self.type}" + (" joint" if self.type == "universal" else "")
+        faults: list[Fault] = []
+        if self.bodies[0] == self.bodies[1]:
+            faults.append((("bodies",), list(self.bodies), "must be two different bodies"))
+        for key, value, allowed in (
+            ("axis", self.axis, self.type in WITH_AXIS),
+            ("second_axis", self.second_axis, self.type == "universal"),
+        ):
+            if allowed and value is None:
+                faults.append(((key,), None, f"must be given for {kind}"))
+            if not allowed and value is not None:
+                faults.append(((key,), list(value), f"must be left out: {kind} has none"))
+        if self.axis is not None and self.second_axis is not None:
+            if abs(np.dot(self.axis, self.second_axis)) > ROUNDING:
+                faults.append((("second_axis",), list(self.second_axis), "must be perpendicular to `axis`"))
+        if self.type == "pin" and self.torsional_stiffness is not None:
+            faults.append((("torsional_stiffness",), self.torsional_stiffness, "must be left out: a pin turns freely"))
+        if self.turning is not None and self.type not in TURNS:
+            found = self.turning.model_dump(exclude_defaults=True)
+            faults.append((("turning",), found, f"must be left out: {kind} has no axis about which alone it turns"))
+        if self.sliding is not None and self.type not in SLIDES:
+            found = self.sliding.model_dump(exclude_defaults=True)
+            faults.append((("sliding",), found, f"must be left out: {kind} does not slide"))
+        return faults

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import model_validator
-
-from bilayer_core.scene.faults import Fault, refuse_all
+from bilayer_core.scene.faults import Fault
 from bilayer_core.scene.part import Name, Part
 from bilayer_core.scene.schedule import Hold, Schedule
 from bilayer_core.scene.spans import Spans
@@ -49,29 +47,23 @@ class Load(Part):
     schedule: Schedule | None = None
     """Factor over time; without it 1."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Load:
-        refuse_all("Load", faults_of_load(self))
-        return self
+    def _faults(self) -> list[Fault]:
+        """Return the faults of a load that does not act on one thing, at one place, with what is allowed there."""
+        if (self.rod is None) == (self.body is None):
+            found = None if self.rod is None else f"{self.rod}, beside the body {self.body}"
+            return [(("rod",), found, "must be given, or `body` instead of it: a load acts on one of the two")]
+        faults: list[Fault] = []
+        if self.rod is not None and self.position is None:
+            faults.append((("position",), None, "must be given for a load on a rod: a length along its path"))
+        if self.body is not None and self.position is not None:
+            faults.append((("position",), self.position, "must be left out: a force on a body acts at its mass centre"))
+        if self.rod is not None and any(self.moment):
+            faults.append((("moment",), self.moment, "must be left out: only bodies take moments"))
+        if not any(self.force) and not any(self.moment):
+            faults.append((("force",), self.force, "must not be zero" + (" where `moment` is" if self.body else "")))
+        return faults
 
     @property
     def factor(self) -> Spans:
         """Factor of force and moment over time."""
         return ALWAYS if self.schedule is None else self.schedule
-
-
-def faults_of_load(load: Load) -> list[Fault]:
-    """Return the faults of a load unless it acts on one thing, at one place, with a force or moment allowed there."""
-    if (load.rod is None) == (load.body is None):
-        found = None if load.rod is None else f"{load.rod}, beside the body {load.body}"
-        return [(("rod",), found, "must be given, or `body` instead of it: a load acts on one of the two")]
-    faults: list[Fault] = []
-    if load.rod is not None and load.position is None:
-        faults.append((("position",), None, "must be given for a load on a rod: a length along its path"))
-    if load.body is not None and load.position is not None:
-        faults.append((("position",), load.position, "must be left out: a force on a body acts at its mass centre"))
-    if load.rod is not None and any(load.moment):
-        faults.append((("moment",), load.moment, "must be left out: only bodies take moments"))
-    if not any(load.force) and not any(load.moment):
-        faults.append((("force",), load.force, "must not be zero" + (" where `moment` is" if load.body else "")))
-    return faults

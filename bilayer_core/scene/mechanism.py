@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated
 
-from pydantic import model_validator
-
-from bilayer_core.scene.faults import Fault, refuse_all
+from bilayer_core.scene.faults import Fault
 from bilayer_core.scene.part import Part
 from bilayer_core.scene.units import Angle, Length, PositiveSpeed, real
 
@@ -42,10 +40,8 @@ class Turning(Part):
     limit_stiffness: PositiveTorsion | None = None
     """Moment by the angle beyond a limit; by default a hundred times that of the stiffest bend of a rod."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Turning:
-        refuse_all("Turning", list(_faults(self, "rest_angle")))
-        return self
+    def _faults(self) -> Iterator[Fault]:
+        return _faults_of_limits(self, "rest_angle")
 
     @property
     def rest(self) -> float:
@@ -71,10 +67,8 @@ class Sliding(Part):
     limit_stiffness: PositiveStiffness | None = None
     """Force by the distance beyond a limit; by default a hundred times that of the stiffest edge of a rod."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Sliding:
-        refuse_all("Sliding", list(_faults(self, "rest_position")))
-        return self
+    def _faults(self) -> Iterator[Fault]:
+        return _faults_of_limits(self, "rest_position")
 
     @property
     def rest(self) -> float:
@@ -102,7 +96,7 @@ def resistance(*laws: Turning | Sliding | None) -> str:
     return " with " + " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
-def _faults(law: Turning | Sliding, rest: str) -> Iterator[Fault]:
+def _faults_of_limits(law: Turning | Sliding, rest: str) -> Iterator[Fault]:
     """Yield the faults of keys that need another, and of limits that leave no room."""
     if law.spring == 0.0 and getattr(law, rest) != 0.0:
         yield (rest,), getattr(law, rest), "must be left out: there is no `spring`"

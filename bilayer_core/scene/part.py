@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from functools import cached_property
 from typing import Annotated, Any, Self, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from bilayer_core.names import LONGEST_NAME, NAME
 from bilayer_core.printable import shortened
-from bilayer_core.scene.faults import refuse
+from bilayer_core.scene.faults import Fault, refuse, refuse_all
 from bilayer_core.scene.units import (
     AngularSpeed,
     Length,
@@ -70,6 +70,15 @@ class Part(BaseModel):
     """Unknown keys are faults, and nothing changes after validation."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        refuse_all(type(self).__name__, list(self._faults()))
+        return self
+
+    def _faults(self) -> Iterable[Fault]:
+        """Return the faults of values that are right by themselves, and do not go with each other."""
+        return ()
 
     @cached_property
     def _kept(self) -> _Kept:

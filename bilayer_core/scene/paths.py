@@ -15,9 +15,8 @@ from abc import abstractmethod
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import model_validator
 
-from bilayer_core.scene.faults import ROUNDING, Fault, refuse_all
+from bilayer_core.scene.faults import ROUNDING, Fault
 from bilayer_core.scene.part import Direction, Part, Point
 from bilayer_core.scene.units import NonNegativeLength, PositiveAngle, PositiveLength
 
@@ -124,10 +123,15 @@ class ArcPath(Path):
     closed: bool = False
     """Of a full circle, `angle: 360 deg`: the rod is a ring without ends, and its last station is the first."""
 
-    @model_validator(mode="after")
-    def _check(self) -> ArcPath:
-        refuse_all("ArcPath", faults_of_arc(self))
-        return self
+    def _faults(self) -> list[Fault]:
+        """Return a fault if the arc is to be closed and its ends do not meet."""
+        if not self.closed or abs(self.angle - 2.0 * math.pi) <= ROUNDING:
+            return []
+        gap = 2.0 * self.radius * abs(math.sin(0.5 * self.angle))
+        demand = f"must be 360 deg of a closed path: its ends are {gap:.3g} m apart"
+        if self.angle > 2.0 * math.pi:
+            demand = "must be 360 deg of a closed path"
+        return [(("angle",), self.angle, demand)]
 
     @property
     def length(self) -> float:
@@ -163,17 +167,6 @@ class ArcPath(Path):
         return f"arc of radius {1e3 * self.radius:.4g} mm over {math.degrees(self.angle):.4g}°"
 
 
-def faults_of_arc(path: ArcPath) -> list[Fault]:
-    """Return a fault if the arc is to be closed and its ends do not meet."""
-    if not path.closed or abs(path.angle - 2.0 * math.pi) <= ROUNDING:
-        return []
-    gap = 2.0 * path.radius * abs(math.sin(0.5 * path.angle))
-    demand = f"must be 360 deg of a closed path: its ends are {gap:.3g} m apart"
-    if path.angle > 2.0 * math.pi:
-        demand = "must be 360 deg of a closed path"
-    return [(("angle",), path.angle, demand)]
-
-
 class SpiralPath(Path):
     """An Archimedean spiral in the plane of its direction and the rod's normal: its radius changes evenly with the
     angle.
@@ -193,10 +186,13 @@ class SpiralPath(Path):
     toward: Literal["normal", "opposite"] = "normal"
     """Side on which the centre lies: that of the rod's normal at the start, or the other."""
 
-    @model_validator(mode="after")
-    def _check(self) -> SpiralPath:
-        refuse_all("SpiralPath", faults_of_spiral(self))
-        return self
+    def _faults(self) -> list[Fault]:
+        """Return the radii that make it no spiral."""
+        if math.isclose(self.start_radius, self.end_radius, rel_tol=ROUNDING):
+            return [
+                (("end_radius",), self.end_radius, "must differ from `start_radius`; with equal radii it is an `arc`")
+            ]
+        return []
 
     @property
     def growth(self) -> float:
@@ -268,13 +264,6 @@ class SpiralPath(Path):
         return f"spiral of radius {radii} over {math.degrees(self.angle):.4g}°"
 
 
-def faults_of_spiral(path: SpiralPath) -> list[Fault]:
-    """Return the radii that make it no spiral."""
-    if math.isclose(path.start_radius, path.end_radius, rel_tol=ROUNDING):
-        return [(("end_radius",), path.end_radius, "must differ from `start_radius`; with equal radii it is an `arc`")]
-    return []
-
-
 class HelixPath(Path):
     """A helix, on which the rod lies as a ribbon wound on a cylinder: its normal points straight to the axis or away
     from it everywhere, its width lies in the surface.
@@ -299,10 +288,11 @@ class HelixPath(Path):
     toward: Literal["normal", "opposite"] = "normal"
     """Side on which the axis lies: that of the rod's normal, or the other."""
 
-    @model_validator(mode="after")
-    def _check(self) -> HelixPath:
-        refuse_all("HelixPath", faults_of_helix(self))
-        return self
+    def _faults(self) -> list[Fault]:
+        """Return a fault if the helix runs into its own start."""
+        if self.pitch > 0.0 or self.angle < 2.0 * math.pi * (1.0 - ROUNDING):
+            return []
+        return [(("pitch",), self.pitch, "must be above 0 for a full turn or more: it would close on itself")]
 
     @property
     def _rise(self) -> float:
@@ -354,10 +344,3 @@ class HelixPath(Path):
         """Describe the shape in words."""
         size = f"radius {1e3 * self.radius:.4g} mm, pitch {1e3 * self.pitch:.4g} mm"
         return f"{self.handedness}-handed helix of {size}, {self.angle / (2.0 * math.pi):.4g} turns"
-
-
-def faults_of_helix(path: HelixPath) -> list[Fault]:
-    """Return a fault if the helix runs into its own start."""
-    if path.pitch > 0.0 or path.angle < 2.0 * math.pi * (1.0 - ROUNDING):
-        return []
-    return [(("pitch",), path.pitch, "must be above 0 for a full turn or more: it would close on itself")]

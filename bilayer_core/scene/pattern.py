@@ -10,10 +10,10 @@ from itertools import product
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from bilayer_core.kinematics.rotation import rotation_matrix
-from bilayer_core.scene.faults import Fault, Location, refuse, refuse_all
+from bilayer_core.scene.faults import Fault, Location, refuse
 from bilayer_core.scene.limits import MOST_COPIES
 from bilayer_core.scene.part import Direction, Name, Part, Point
 from bilayer_core.scene.units import Angle, Number, whole
@@ -115,17 +115,15 @@ class Pattern(Part):
             if getattr(self, key) is not None:
                 yield (key,), getattr(self, key)
 
-    @model_validator(mode="after")
-    def _check(self) -> Pattern:
-        faults = list(self._faults())
+    def _faults(self) -> Iterator[Fault]:
+        faults = list(self._faults_of_places())
+        yield from faults
         for where, entries in () if faults else self.per_copy():
             if len(entries) != self.copies:
                 demand = f"must have an entry for each of the {self.copies} copies"
-                faults.append((where, f"{len(entries)} entries", demand))
-        refuse_all(type(self).__name__, faults)
-        return self
+                yield where, f"{len(entries)} entries", demand
 
-    def _faults(self) -> Iterator[Fault]:
+    def _faults_of_places(self) -> Iterator[Fault]:
         return iter(())
 
 
@@ -148,7 +146,7 @@ class Rotation(Pattern):
         axis = np.array(self.axis)
         return [placed(_turned(step * copy / parts * axis), self.center) for copy in range(self.count)]
 
-    def _faults(self) -> Iterator[Fault]:
+    def _faults_of_places(self) -> Iterator[Fault]:
         if self.angle == 0.0:
             yield ("angle",), self.angle, "must not be zero: all copies would lie on each other"
 
@@ -186,7 +184,7 @@ class Grid(Pattern):
         places = product(*(range(count) for count in reversed(self.counts)))
         return [placed(shift=np.array(place[::-1], float) @ steps) for place in places]
 
-    def _faults(self) -> Iterator[Fault]:
+    def _faults_of_places(self) -> Iterator[Fault]:
         if len(self.counts) != len(self.steps):
             yield ("counts",), f"{len(self.counts)} entries", f"must be as many as `steps`, {len(self.steps)}"
         elif self.copies > MOST_COPIES:

@@ -59,10 +59,8 @@ class PointPath(Path):
         table = CsvFile(cls.__name__, data["file"], (info.context or {}).get("directory", ""))
         return {**data, **points_of_file(table), "file": None}
 
-    @model_validator(mode="after")
-    def _check(self) -> PointPath:
-        refuse_all(type(self).__name__, faults_of_points(self))
-        return self
+    def _faults(self) -> list[Fault]:
+        return faults_of_points(self)
 
     @property
     def start(self) -> Point:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Annotated, Any, Generic, TypeVar
 
 import numpy as np
-from pydantic import BeforeValidator, Field, TypeAdapter, model_validator
+from pydantic import BeforeValidator, Field, TypeAdapter
 
-from bilayer_core.scene.faults import Fault, refuse_all
+from bilayer_core.scene.faults import Fault
 from bilayer_core.scene.part import Part
 from bilayer_core.scene.units import NonNegativeLength, Quantity
 
@@ -27,8 +27,7 @@ class Profile(Part, Generic[Value]):
         """Return the title in the JSON Schema."""
         return f"Profile of {_quantity(params[0]).what}"
 
-    @model_validator(mode="after")
-    def _check(self) -> Profile:
+    def _faults(self) -> list[Fault]:
         faults: list[Fault] = [
             (("at", index), after, f"must be further than the place before it ({before:g} m)")
             for index, (before, after) in enumerate(zip(self.at, self.at[1:], strict=False), start=1)
@@ -36,8 +35,7 @@ class Profile(Part, Generic[Value]):
         ]
         if len(self.at) != len(self.value):
             faults.append((("value",), f"{len(self.value)} entries", f"must be as many as `at`, {len(self.at)}"))
-        refuse_all("Profile", faults)
-        return self
+        return faults
 
 
 def _quantity(annotation: Any) -> Quantity:

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, field_serializer, model_validator
+from pydantic import BeforeValidator, Field, field_serializer
 
 from bilayer_core.scene.close_paths import crossings
 from bilayer_core.scene.eigenstrain import Eigenstrain
-from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, refuse_all, repeated
+from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, repeated
 from bilayer_core.scene.imperfection import Imperfection
 from bilayer_core.scene.limits import MOST_NODES
 from bilayer_core.scene.part import AngularVelocity, Direction, Name, Part, Velocity
@@ -209,10 +209,8 @@ class Rod(Part):
         first, last = self.span_of(layer, law)
         return range(math.floor(first), math.ceil(last)) if first < last else range(0)
 
-    @model_validator(mode="after")
-    def _check(self) -> Rod:
-        refuse_all("Rod", faults_of_rod(self))
-        return self
+    def _faults(self) -> list[Fault]:
+        return faults_of_rod(self)
 
 
 def _near_whole(station: float) -> float:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
+from collections.abc import Iterator
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, BaseModel, Field, ValidationInfo
 
-from bilayer_core.scene.faults import Fault, refuse_all
+from bilayer_core.scene.faults import Fault
+from bilayer_core.scene.part import Part
 from bilayer_core.scene.spans import ROUNDING, Span, Spans
 from bilayer_core.scene.table_file import TableFile, read_table_file
 from bilayer_core.scene.units import NonNegativeTime, PlainNumber, PositiveTime, Time
@@ -44,11 +46,9 @@ class Ramp(Spans):
     to_value: PlainNumber = Field(alias="to")
     """In the unit of the channel."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Ramp:
+    def _faults(self) -> Iterator[Fault]:
         if self.end <= self.start:
-            refuse_all("Ramp", [(("end",), self.end, f"must be later than `start` ({self.start:g} s)")])
-        return self
+            yield ("end",), self.end, f"must be later than `start` ({self.start:g} s)"
 
     def span(self, t: float) -> Span:
         """Return the span before, on, or after the ramp."""
@@ -73,10 +73,8 @@ class Table(Spans):
     values: list[PlainNumber] = Field(min_length=1)
     """In the unit of the channel, as many as there are times."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Table:
-        refuse_all("Table", faults_of_times(self.times, ("values",), self.values))
-        return self
+    def _faults(self) -> list[Fault]:
+        return faults_of_times(self.times, ("values",), self.values)
 
     def span(self, t: float) -> Span:
         """Return the span between two of the times, before the first, or after the last."""
@@ -94,10 +92,8 @@ class Table(Spans):
         return {("values", index): value for index, value in enumerate(self.values)}
 
 
-class SequencePart(BaseModel):
+class SequencePart(Part):
     """A part of a sequence."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     duration: PositiveTime
     """After which the next part follows."""

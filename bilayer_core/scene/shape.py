@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from bilayer_core.scene.faults import faults_of_rounding, refuse_all
+from bilayer_core.scene.faults import Fault, faults_of_rounding
 from bilayer_core.scene.limits import MOST_POINTS
 from bilayer_core.scene.part import Direction, Name, Part, Point
 from bilayer_core.scene.units import Angle, NonNegativeLength, PositiveLength, whole
@@ -45,10 +45,8 @@ class _Box(_Grained):
     rounding: NonNegativeLength = 0.0
     """Radius of its edges and corners; the box keeps its size."""
 
-    @model_validator(mode="after")
-    def _check(self) -> _Box:
-        refuse_all("Box", faults_of_rounding(self.rounding, 0.5 * min(self.size), "half the shortest edge"))
-        return self
+    def _faults(self) -> list[Fault]:
+        return faults_of_rounding(self.rounding, 0.5 * min(self.size), "half the shortest edge")
 
 
 class _Cylinder(_Grained):
@@ -65,11 +63,9 @@ class _Cylinder(_Grained):
     rim_points: Annotated[int, *whole(3, MOST_POINTS)] = 64
     """Points on each rim that feel other surfaces; rolling down a slope, 64 lose 1 to 3 % of the acceleration."""
 
-    @model_validator(mode="after")
-    def _check(self) -> _Cylinder:
+    def _faults(self) -> list[Fault]:
         largest = min(self.radius, 0.5 * self.length)
-        refuse_all("Cylinder", faults_of_rounding(self.rounding, largest, "the radius and half the length"))
-        return self
+        return faults_of_rounding(self.rounding, largest, "the radius and half the length")
 
 
 class Plane(_Plane):

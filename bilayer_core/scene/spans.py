@@ -6,7 +6,7 @@ import math
 from abc import abstractmethod
 from typing import NamedTuple
 
-from pydantic import BaseModel, ConfigDict
+from bilayer_core.scene.part import Part
 
 ROUNDING = 1e-9
 """Part of a period by which a wave switches early, so that rounding of the time never delays it by a step."""
@@ -66,10 +66,8 @@ class Span(NamedTuple):
         return abs(after - before) > ROUNDING * largest
 
 
-class Spans(BaseModel):
+class Spans(Part):
     """Something that goes from one span to the next."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     @abstractmethod
     def span(self, t: float) -> Span:

@@ -9,19 +9,16 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
-
 from bilayer_core.scene.faults import one_of, refuse_all
 from bilayer_core.scene.limits import LARGEST_TABLE, longest, read_text, refused_file_name
+from bilayer_core.scene.part import Part
 
 
-class TableFile(BaseModel):
+class TableFile(Part):
     """Values at given times from two columns of a csv file, whose first line names its columns.
 
     It is read when the scene is, and is a `Table` from then on.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
     type: Literal["csv"]
     file: str

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import model_validator
-
-from bilayer_core.scene.faults import Fault, refuse_all
+from bilayer_core.scene.faults import Fault
 from bilayer_core.scene.spans import ROUNDING, Span, Spans
 from bilayer_core.scene.units import Angle, DutyCycle, NonNegativeTime, PlainNumber, PositiveTime, Time, whole
 
@@ -79,7 +77,7 @@ class _Pulses(Spans):
             return Span(bottom, self.high, fall, (self.low - self.high) / self.rise_time)
         return Span(self.start + (cycle + 1) * self.period if cycle + 1 < last else math.inf, self.low)
 
-    def _faults(self, width: float, where: str) -> list[Fault]:
+    def _faults_of_rise(self, width: float, where: str) -> list[Fault]:
         """Return a fault unless both flanks fit into the period."""
         shortest = min(width, self.period - width)
         if self.rise_time <= shortest * (1.0 + ROUNDING):
@@ -99,10 +97,8 @@ class Square(_Pulses):
     duty: DutyCycle = 0.5
     """Part of the period from the beginning of the rise to the beginning of the fall."""
 
-    @model_validator(mode="after")
-    def _check(self) -> Square:
-        refuse_all("Square", self._faults(self.duty * self.period, "duty"))
-        return self
+    def _faults(self) -> list[Fault]:
+        return self._faults_of_rise(self.duty * self.period, "duty")
 
     def span(self, t: float) -> Span:
         """Return the span that contains time `t` [s]."""
@@ -118,12 +114,10 @@ class PulseTrain(_Pulses):
     count: Annotated[int, *whole(1)]
     """Of pulses."""
 
-    @model_validator(mode="after")
-    def _check(self) -> PulseTrain:
+    def _faults(self) -> list[Fault]:
         if self.width >= self.period:
-            refuse_all("PulseTrain", [(("width",), self.width, f"must be below `period` ({self.period:g} s)")])
-        refuse_all("PulseTrain", self._faults(self.width, "width"))
-        return self
+            return [(("width",), self.width, f"must be below `period` ({self.period:g} s)")]
+        return self._faults_of_rise(self.width, "width")
 
     def span(self, t: float) -> Span:
         """Return the span that contains time `t` [s]."""

@@ -190,7 +190,7 @@ class McapRecorder:
         self._keep(event)
 
     def _keep(self, item: Input | Event) -> None:
-        """Hand over what is never left out."""
+        """Put what is never left out into the backlog."""
         self._refuse_unstarted()
         if self._patience is None:
             self._put(item)

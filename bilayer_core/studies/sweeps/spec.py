@@ -6,14 +6,14 @@ import re
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
 from bilayer_core.errors import InputError, SceneError
 from bilayer_core.scene.bundled import bundled_sweep, is_file_name
-from bilayer_core.scene.faults import Fault, one_of, refuse, refuse_all, tell
+from bilayer_core.scene.faults import Fault, one_of, refuse, tell
 from bilayer_core.scene.limits import LARGEST_FILE, read_text
 from bilayer_core.scene.part import Name, Part
 from bilayer_core.scene.text import read_yaml
@@ -106,11 +106,6 @@ class Parameter(Part):
         if of.unit == self.unit:
             return of.value
         return parse_quantity(f"{of.value!r} {of.unit}", self.unit)
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        refuse_all("parameter", list(self._faults()))
-        return self
 
     def _faults(self) -> list[Fault]:
         ranged = self.from_ is not None or self.to is not None
@@ -262,11 +257,6 @@ class SweepSpec(Part):
     logs: Literal["none", "all"] | dict[str, Condition] = "none"
     """Which runs leave a log: those whose columns meet all conditions."""
     limits: RunLimits = RunLimits()
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        refuse_all("sweep", self._faults())
-        return self
 
     def _faults(self) -> list[Fault]:
         faults: list[Fault] = []
