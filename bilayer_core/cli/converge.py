@@ -9,7 +9,7 @@ import click
 
 from bilayer_core.cli.json_output import json_option, json_to
 from bilayer_core.cli.options import Duration, Verb, scene_argument, set_option
-from bilayer_core.cli.terminal import say
+from bilayer_core.cli.terminal import print_table, say
 from bilayer_core.cli.watch import compile_kernels
 
 
@@ -56,18 +56,12 @@ def converge(
 
 
 def _print_table(rows: list) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
     from bilayer_core.studies.converge.quantities import unit_of
     from bilayer_core.studies.converge.study import BASE
 
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    for title in ("figure", "value", "error bar", "half the step", "order", "twice the edges", "order"):
-        table.add_column(title, justify="left" if title == "figure" else "right")
-    for row in rows:
+    def texts(row: Any) -> tuple[str, ...]:
         unit, factor = unit_of(row.name)
-        table.add_row(
+        return (
             row.name,
             f"{factor * row.values[BASE]:.6g} {unit}",
             f"± {factor * row.bar:.2g}",
@@ -76,7 +70,9 @@ def _print_table(rows: list) -> None:
             f"{100 * row.mesh.change:+.2g} %",
             _order(row.mesh.order),
         )
-    Console(width=120).print(table)
+
+    titles = ("figure", "value", "error bar", "half the step", "order", "twice the edges", "order")
+    print_table(titles, map(texts, rows))
 
 
 def _order(order: float | None) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from bilayer_core.cli.terminal import say
+from bilayer_core.cli.terminal import print_table, say
 from bilayer_core.studies.converge.order import ROUNDING
 from bilayer_core.studies.converge.quantities import unit_of
 from bilayer_core.studies.converge.study import BASE, FINER_STEP, FINEST_STEP, Row, Study
@@ -29,19 +29,15 @@ def errors_of(study: Study) -> dict[str, Any]:
 
 def print_errors(study: Study) -> None:
     """Print it, one line a figure."""
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(box=None, padding=(0, 2, 0, 0))
     finest = any(FINEST_STEP in row.values for row in study.rows)
     levels = (BASE, FINER_STEP, FINEST_STEP) if finest else (BASE, FINER_STEP)
-    for title in ("global error", "value", *levels[1:], "error", "order"):
-        table.add_column(title, justify="left" if title == "global error" else "right")
-    for row in study.rows:
+
+    def texts(row: Row) -> tuple[str, ...]:
         unit, factor = unit_of(row.name)
         values = (f"{factor * row.values[run]:.6g} {unit}" for run in levels)
-        table.add_row(row.name, *values, f"± {factor * row.time.bar:.2g} {unit}", _order(row))
-    Console(width=120).print(table)
+        return row.name, *values, f"± {factor * row.time.bar:.2g} {unit}", _order(row)
+
+    print_table(("global error", "value", *levels[1:], "error", "order"), map(texts, study.rows))
     for name, reason in study.missing.items():
         say(f"  {name}: {reason}")
     say("  Of the time steps alone; `bilayer converge` adds the mesh. Contact begins and ends within a step.")

@@ -9,7 +9,7 @@ import click
 
 from bilayer_core.cli.json_output import json_option, json_to
 from bilayer_core.cli.options import Verb, output_directory, scene_argument, set_option
-from bilayer_core.cli.terminal import say
+from bilayer_core.cli.terminal import print_table, say
 from bilayer_core.cli.watch import compile_kernels
 
 if TYPE_CHECKING:
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 NOT_CONVERGED = 1
 """Exit code of a fit that ended before it had converged."""
+WIDTH = 140
+"""Of tables [characters]."""
 
 
 @click.command(cls=Verb)
@@ -81,37 +83,28 @@ def _tell(text: str) -> None:
 
 
 def _print(found: FitResult) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
     values = f"{int(found.data.present.sum())} values of {found.data.source}"
     say(f"{found.scene.name}: {values}, {found.iterations} iterations, {found.runs} runs; {found.termination}")
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    for title in ("parameter", "fitted", "95 % from", "to", "start", "bounds"):
-        table.add_column(title, justify="left" if title == "parameter" else "right")
+    rows = []
     for fitted in found.parameters:
         parameter, shown = fitted.parameter, fitted.parameter.shown
         interval = fitted.interval and [shown(end) for end in fitted.interval]
         bounds = f"{shown(parameter.low, 4)} to {shown(parameter.high, 4)}"
-        table.add_row(fitted.path, shown(fitted.value), *(interval or ("–", "–")), shown(parameter.start, 4), bounds)
-    console = Console(width=140)
-    console.print(table)
+        rows.append((fitted.path, shown(fitted.value), *(interval or ("–", "–")), shown(parameter.start, 4), bounds))
+    print_table(("parameter", "fitted", "95 % from", "to", "start", "bounds"), rows, WIDTH)
     if len(found.parameters) > 1:
-        correlations = Table(box=None, padding=(0, 2, 0, 0))
-        for title in ("correlation", *(str(k + 1) for k in range(len(found.parameters)))):
-            correlations.add_column(title, justify="left" if title == "correlation" else "right")
-        for k, (fitted, row) in enumerate(zip(found.parameters, found.correlations.tolist(), strict=True), 1):
-            correlations.add_row(f"{k} {fitted.path}", *("–" if v != v else f"{v:.3f}" for v in row))
-        console.print(correlations)
-    noise = Table(box=None, padding=(0, 2, 0, 0))
-    for title in ("data", "given noise" if found.sigma_known else "estimated noise", "rms residual"):
-        noise.add_column(title, justify="left" if title == "data" else "right")
+        rows = [
+            (f"{k} {fitted.path}", *("–" if v != v else f"{v:.3f}" for v in row))
+            for k, (fitted, row) in enumerate(zip(found.parameters, found.correlations.tolist(), strict=True), 1)
+        ]
+        print_table(("correlation", *(str(k + 1) for k in range(len(rows)))), rows, WIDTH)
+    rows = []
     for k, column in enumerate(found.data.columns):
         here = found.data.present[:, k]
         rms = float((found.residuals[here, k] ** 2).mean() ** 0.5)
         unit = f" {column.shown_unit}" if column.shown_unit else ""
-        noise.add_row(column.name, *(f"{v / column.factor:.4g}{unit}" for v in (found.sigma[column.name], rms)))
-    console.print(noise)
+        rows.append((column.name, *(f"{v / column.factor:.4g}{unit}" for v in (found.sigma[column.name], rms))))
+    print_table(("data", "given noise" if found.sigma_known else "estimated noise", "rms residual"), rows, WIDTH)
     if found.chi_squared is not None:
         say(f"  chi squared {found.chi_squared:.4g} of {found.freedom} degrees of freedom")
     if found.refused:

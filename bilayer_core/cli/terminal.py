@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+
 import click
 
 from bilayer_core.printable import printable
@@ -10,3 +12,16 @@ from bilayer_core.printable import printable
 def say(text: object, err: bool = False) -> None:
     """Print text in which a terminal finds nothing to obey; see `bilayer_core.printable`."""
     click.echo(printable(str(text)), err=err)
+
+
+def print_table(titles: Sequence[str], rows: Iterable[Sequence[str]], width: int = 120) -> None:
+    """Print a table without a frame: texts in the first column, numbers in the others."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for place, title in enumerate(titles):
+        table.add_column(title, justify="right" if place else "left")
+    for row in rows:
+        table.add_row(*row)
+    Console(width=width).print(table)

@@ -48,7 +48,8 @@ class Override:
         SceneError
             If the path does not exist; says what there is instead.
         """
-        here, place = data, None
+        here: Any = data
+        place: Any = None
         for depth, key in enumerate(self.keys):
             here = here if place is None else here[place]
             place = _place(here, key)

@@ -272,7 +272,7 @@ def run_missing(
     progress, tell : callable, optional
         Called with each row, and with the `Engine` before the first run.
     """
-    there = journal.keys()
+    there, told = journal.keys(), progress or (lambda row: None)
     missing = (point for point in sweep.points() if point.key not in there)
     first = next(missing, None)
     try:
@@ -283,8 +283,8 @@ def run_missing(
                     tell(engine)
                 for rows in engine.run(chain([first], missing)):
                     journal.add(rows)
-                    for row in rows if progress is not None else ():
-                        progress(row)
+                    for row in rows:
+                        told(row)
     finally:
         if directory is not None:
             write_table(journal, sweep.keys(), sweep.about, directory)
