@@ -7,7 +7,7 @@ import math
 from bilayer_core.engine.configuration import measure_departure
 from bilayer_core.engine.kinetic import kinetic_energy
 from bilayer_core.engine.newton import bound, correction_speed, predicted_decrease
-from bilayer_core.engine.potential import add_forces, expand_to_unknowns
+from bilayer_core.engine.potential import add_forces, expand_to_unknowns, total_energy
 from bilayer_core.engine.powers import write_forces_of_laws
 from bilayer_core.forces.friction_limit import limit_by_friction
 from bilayer_core.forces.rod_contact import find_rod_contacts
@@ -45,8 +45,7 @@ def evaluate_at(p, at, stage, with_hessian, expands):
     if status == READY:
         measure_departure(p.bodies, stage, at)
         gap = add_forces(p, at, stage, with_hessian, False)
-        for k in range(p.sums.energy.shape[0]):
-            energy += p.sums.energy[k]
+        energy = total_energy(p.sums)
         if expands:
             expand_to_unknowns(p, at)
     p.outcome.energy, p.outcome.gap = energy, gap

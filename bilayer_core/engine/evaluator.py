@@ -21,9 +21,11 @@ from bilayer_core.engine.linear.newton_matrix import EXACT, assemble, factorise,
 from bilayer_core.engine.potential import start_stage, update_lagged
 from bilayer_core.engine.stages import predict_stage, stand_still_stage, start_step_point
 from bilayer_core.engine.step import write_rest_strains
+from bilayer_core.engine.step_ends import write_shape
 from bilayer_core.engine.storage import Storage, new_configuration, new_work
 from bilayer_core.forces.elements import start_elements
 from bilayer_core.forces.force_register import memory_size
+from bilayer_core.forces.mechanisms import REMEMBERED
 from bilayer_core.model.force_slots import NAMES
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.problem import Problem, Sums
@@ -119,6 +121,17 @@ class Evaluator:
         """
         self._put(step, body_step)
         move(self.problem, base, 1.0, self.stage, at)
+
+    def write_shape(self, at: Configuration, state: State) -> None:
+        """Give a state, which may be one of the same scene in another dimension, the shape of a configuration."""
+        write_shape(self.problem, at, self._arrays)
+        for name in ("position", "position_low", "director1", "twist", "body_position", "body_position_low"):
+            mine, part = getattr(self._state, name), getattr(state, name)
+            if mine.shape == part.shape:
+                part[...] = mine
+        state.body_rotation[:] = self._state.body_rotation
+        turned = REMEMBERED * len(self.model.mechanisms)  # first of the memory in both dimensions
+        state.memory[:turned] = self._state.memory[:turned]
 
     def _put(self, step: Array, body_step: Array) -> None:
         system = self.problem.system

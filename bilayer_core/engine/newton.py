@@ -19,7 +19,7 @@ from bilayer_core.engine.configuration import (
     update_attached,
 )
 from bilayer_core.engine.linear.newton_matrix import factorise, solve
-from bilayer_core.engine.potential import evaluate, settle_forces, update_lagged
+from bilayer_core.engine.potential import evaluate, settle_forces, total_energy, update_lagged
 from bilayer_core.engine.request_modes import NEGATIVE, VALUE
 from bilayer_core.forces.friction_limit import limit_by_friction
 from bilayer_core.forces.rod_contact import bound_between_rods, find_rod_contacts
@@ -292,6 +292,8 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
             at, trial, swapped = trial, at, not swapped
             if update_lagged(p, at, stage):
                 curved, task = False, UPDATE_LAGGED
+            else:
+                energy = value = total_energy(p.sums)
             if short or halvings > 0:
                 task = FACTORISE
             if task != SEARCH:

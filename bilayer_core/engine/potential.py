@@ -79,10 +79,16 @@ def evaluate(p, at, stage, with_hessian, again):
     """
     gap = add_forces(p, at, stage, with_hessian, again)
     expand_to_unknowns(p, at)
+    return total_energy(p.sums), gap
+
+
+@kernel
+def total_energy(sums):
+    """Return the sum of the energies of all forces [J]."""
     energy = 0.0
-    for k in range(p.sums.energy.shape[0]):
-        energy += p.sums.energy[k]
-    return energy, gap
+    for k in range(sums.energy.shape[0]):
+        energy += sums.energy[k]
+    return energy
 
 
 @piece(float, Problem, Configuration, Stage, bool, bool)

@@ -29,7 +29,16 @@ from bilayer_core.kinematics.rotating import inertia_tensor, rotate_by, rotation
 from bilayer_core.kinematics.vector import row
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
-from bilayer_core.model.records.step import Configuration, Method, Point, Stage, StageInputs, StateArrays, Work
+from bilayer_core.model.records.step import (
+    IN_MOTION,
+    Configuration,
+    Method,
+    Point,
+    Stage,
+    StageInputs,
+    StateArrays,
+    Work,
+)
 
 SPIN_ITERATIONS = 50
 SPIN_CHANGE = 1e-15
@@ -216,7 +225,7 @@ def predict_stage(p, state, work, inputs, n, previous, start):
     for i in range(origin.fluid_momentum.shape[0]):
         for c in range(3):
             stage.origin_fluid_momentum[i, c] = origin.fluid_momentum[i, c]
-    stage.still[0] = 0.0
+    stage.still[0] = IN_MOTION
     copy(origin.strain, stage.origin_strain)
     predict_directors(p.raised, origin, length, stage.predicted_director)
     _take_twist(start, stage)
@@ -293,7 +302,7 @@ def stand_still_stage(p, state, start, with_fluid, stage):
     measure_directors(p.raised, start, stage.origin_strain)
     copy_directors(p.raised, start, stage.predicted_director)
     add_scaled(stage.origin_strain, -length, state.strain_rate)
-    stage.still[0] = 0.0
+    stage.still[0] = IN_MOTION
     stage.origin_fluid_momentum[:] = 0.0
     if with_fluid:
         momentum_at(p, start, state.velocity, state.strain_rate, stage.origin_fluid_momentum)

@@ -42,7 +42,15 @@ from bilayer_core.jit import kernel, piece, record_at
 from bilayer_core.kinematics.copying import copy
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import BEYOND, BLOCKED, COLLAPSED, CONVERGED, CROSSED, MAX_ITERATIONS, READY
-from bilayer_core.model.records.step import Configuration, Method, StageInputs, StateArrays, Work
+from bilayer_core.model.records.step import (
+    AT_REST,
+    LOOKED_AT,
+    Configuration,
+    Method,
+    StageInputs,
+    StateArrays,
+    Work,
+)
 
 configuration_at = record_at(Configuration)
 LEAST_LENGTH = 0.01
@@ -298,7 +306,8 @@ def _evaluate_at_rest(p, state, work, at, scratch, counts):
     """
     here = configuration_at(work.configurations[at])
     stand_still_stage(p, state, here, counts, work.stage)
-    work.stage.still[0] = 1.0 if work.stage.length >= WITHOUT_INERTIA else 0.0
+    if counts:
+        work.stage.still[0] = AT_REST if work.stage.length >= WITHOUT_INERTIA else LOOKED_AT
     status = start_stage(p, here, work.stage)
     if status != READY:
         return status, at
@@ -350,7 +359,7 @@ def treat_state(p, state, work, mode, length, tolerance, max_iterations):
         note_start(p.surfaces, start)
     stage.length = stage.momentum_length = length
     stand_still_stage(p, state, start, True, stage)
-    stage.still[0] = 1.0
+    stage.still[0] = AT_REST
     status = start_stage(p, start, stage)
     if status != READY:
         return _leave(p, status, -1, e)

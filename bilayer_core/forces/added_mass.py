@@ -54,7 +54,9 @@ With a = U·m1, b = U·m2, c = U·t, and ε₁, ε₂, ε_t the parts of ε alon
     l ∂²V:   ε₁θ   (m₁ − m₂) b c   ε₂θ   (m₁ − m₂) a c    and of θθ itself  (m₁ − m₂)(a² − b²)
 
 (in a plane, by the angle φ of the edge: ∂V/∂φ = σ m₁ a c, ∂²V/∂φ² = m₁ (a² − c²)). Statics
-(`simulation.equilibrium`) minimise V with the rest, with these exact derivatives. −m₁ c² is Lighthill's −M U² κ: along
+(`simulation.equilibrium`) minimise V with the rest, with these exact derivatives. Of an edge that moves they are those
+of −T at held velocities, with u in place of U: looks out of a plane (`simulation.plane_watch`) count modes with this
+stiffness beside the inertia. −m₁ c² is Lighthill's −M U² κ: along
 a straight strip the flow acts as a dead compression of M U², and a cantilever diverges at M U² = π² EI/4 L². A tail
 that sheds a wake would lack the force M U (∂_t + U ∂_s) w at its end; such a strip does not diverge but flutters, at a
 higher speed (Païdoussis 2014, ch. 8).
@@ -79,7 +81,7 @@ from bilayer_core.kinematics.vector import (
 from bilayer_core.model.force_slots import slot_of
 from bilayer_core.model.records.parts import Fluid
 from bilayer_core.model.records.problem import Problem
-from bilayer_core.model.records.step import Configuration, Stage
+from bilayer_core.model.records.step import AT_REST, IN_MOTION, Configuration, Stage
 
 ADDED_MASS = slot_of("added mass")
 
@@ -158,29 +160,44 @@ def write_inertia(fluid, node_mass, at):
 
 
 @kernel
-def _add_potential_at_rest(fluid, p, at, with_hessian):
-    """Add V of a flow about edges at rest, and its derivatives."""
-    sums, plane, flow, energy = p.sums, p.plane, (fluid.velocity[0], fluid.velocity[1], fluid.velocity[2]), 0.0
+def _add_potential_at_rest(fluid, p, at):
+    """Add V of a flow about edges at rest, and its gradient."""
+    sums, flow, energy = p.sums, (fluid.velocity[0], fluid.velocity[1], fluid.velocity[2]), 0.0
     for k in range(fluid.mass.shape[0]):
-        m1, m2, length = fluid.mass[k, 0], fluid.mass[k, 1], at.length[k]
-        t, d1, d2 = row(at.tangent, k), row(at.director1, k), row(at.director2, k)
-        a, b, c = dot(flow, d1), dot(flow, d2), dot(flow, t)
+        m1, m2 = fluid.mass[k, 0], fluid.mass[k, 1]
+        d1, d2 = row(at.director1, k), row(at.director2, k)
+        a, b, c = dot(flow, d1), dot(flow, d2), dot(flow, row(at.tangent, k))
         energy -= 0.5 * (m1 * a * a + m2 * b * b)
-        add_row(sums.edge, k, c / length, combine(m1 * a, d1, m2 * b, d2))
+        add_row(sums.edge, k, c / at.length[k], combine(m1 * a, d1, m2 * b, d2))
         sums.edge[k, 3] -= (m1 - m2) * a * b
-        if with_hessian and plane.exists:
+    sums.energy[ADDED_MASS] = energy
+
+
+@kernel
+def _add_stiffness_of_flow(fluid, p, at, moving):
+    """Add −∂²T/∂q² of the halves of edges, which move relative to the flow as when the fluid was updated, times
+    `moving`.
+    """
+    plane, velocity, hessian = p.plane, fluid.node_velocity, p.sums.edge_hessian
+    for h in range(2 * fluid.mass.shape[0]):
+        k = h // 2
+        i, r, inverse = fluid.edge_node[k] + h % 2, fluid.raised[k], 1.0 / at.length[k]
+        u = combine(moving, row(velocity, i), -1.0, (fluid.velocity[0], fluid.velocity[1], fluid.velocity[2]))
+        if r >= 0:
+            u = combine(1.0, u, moving * fluid.middle[r], row(fluid.director_rate, r))
+        t, d1, d2 = row(at.tangent, k), row(at.director1, k), row(at.director2, k)
+        a, b, c, m1, m2 = dot(u, d1), dot(u, d2), dot(u, t), 0.5 * fluid.mass[k, 0], 0.5 * fluid.mass[k, 1]
+        if plane.exists:
             plane.polar_gradient[k, 1] += plane.side[k] * m1 * a * c
             plane.polar_hessian[k, 2] += m1 * (a * a - c * c)
-        elif with_hessian:
-            hessian, inverse = sums.edge_hessian, 1.0 / length
-            square = inverse * inverse
-            add_upper_outer(hessian, k, m1 * (a * a - c * c) * square, d1)
-            add_upper_outer(hessian, k, m2 * (b * b - c * c) * square, d2)
-            add_upper_symmetric(hessian, k, 0.5 * (m1 + m2) * a * b * square, d1, d2)
-            add_upper_symmetric(hessian, k, -c * square, t, combine(m1 * a, d1, m2 * b, d2))
-            add_column(hessian, k, 3, (m1 - m2) * c * inverse, combine(b, d1, a, d2))
-            hessian[k, 3, 3] += (m1 - m2) * (a * a - b * b)
-    sums.energy[ADDED_MASS] = energy
+            continue
+        square = inverse * inverse
+        add_upper_outer(hessian, k, m1 * (a * a - c * c) * square, d1)
+        add_upper_outer(hessian, k, m2 * (b * b - c * c) * square, d2)
+        add_upper_symmetric(hessian, k, 0.5 * (m1 + m2) * a * b * square, d1, d2)
+        add_upper_symmetric(hessian, k, -c * square, t, combine(m1 * a, d1, m2 * b, d2))
+        add_column(hessian, k, 3, (m1 - m2) * c * inverse, combine(b, d1, a, d2))
+        hessian[k, 3, 3] += (m1 - m2) * (a * a - b * b)
 
 
 @piece(float, Fluid, Problem, Configuration, Stage, bool)
@@ -189,8 +206,10 @@ def add_added_mass(fluid, p, at, stage, with_hessian):
     sums, h, momentum_length = p.sums, stage.length, stage.momentum_length
     if not sums.selected[ADDED_MASS]:
         return math.inf
-    if stage.still[0] == 1.0:
-        _add_potential_at_rest(fluid, p, at, with_hessian)
+    if with_hessian and stage.still[0] != IN_MOTION:
+        _add_stiffness_of_flow(fluid, p, at, 0.0 if stage.still[0] == AT_REST else 1.0)
+    if stage.still[0] == AT_REST:
+        _add_potential_at_rest(fluid, p, at)
         return math.inf
     mass, edge_node, flow, shape_gradient = fluid.mass, fluid.edge_node, fluid.velocity, fluid.shape_gradient
     direction1, direction2, origin_momentum = fluid.direction1, fluid.direction2, stage.origin_fluid_momentum
@@ -255,7 +274,7 @@ def add_added_mass(fluid, p, at, stage, with_hessian):
 @piece(bool, Fluid, Problem, Configuration, Stage)
 def update_fluid(fluid, p, at, stage):
     """Make a configuration z: take directions and ∂T/∂q from it; returns whether there is anything to take."""
-    if stage.still[0] == 1.0:
+    if stage.still[0] == AT_REST:
         return False
     velocity, position, origin, h = fluid.node_velocity, at.position, stage.origin_position, stage.length
     for i in range(velocity.shape[0]):

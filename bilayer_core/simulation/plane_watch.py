@@ -4,14 +4,17 @@ A planar scene is its own mirror image, so small disturbances δ out of the plan
 
     M δ̈ + C δ̇ + K(t) δ = 0
 
-K the Hessian in space and C that of drag, damping and friction, with contacts as they are. Frozen at a look, as many
-modes grow faster than e^{rt} as K + r C + r² M has negative eigenvalues, since these rise with r. So pivots tell the
-largest rate, and its integral over the looks what a disturbance has grown by.
+K the Hessian in space and C that of drag, damping and friction, with contacts as they are. About added mass, K has the
+stiffness of the flow past moving edges (`forces.added_mass`); its gyroscopic force is left out. Frozen at a look, as
+many modes grow faster than e^{rt} as K + r C + r² M has negative eigenvalues, since these rise with r. So pivots tell
+the largest rate, and its integral over the looks what a disturbance has grown by.
 
 A robot that nothing holds turns out of the plane for free. By an angle φ about an axis in it, a point at a distance s
-from the axis comes to z = φ s, and z̈ = (s̈/s) z looks like growth wherever the robot expands. With forces g at points
-s from the mass centre that is, for the two axes, λ of V a = λ J a, V = Σ g sᵀ and J = Σ m s sᵀ, and rates near √λ tell
-nothing.
+from the axis comes to z = φ s, and z̈ = (s̈/s) z looks like growth wherever the robot expands. With forces g on nodes
+and bodies at s from the mass centre that is, for the two axes, λ of V a = λ J a, V = Σ g sᵀ, and rates near √λ tell
+nothing. A body feels what it holds at its own position: it does not expand, and moments on it do no work in Newton's
+chart of rotations to second order. J is the moment of inertia about the axes: of nodes, of edges about their tangents,
+of bodies, of masses off the curve (`forces.raised`) and of added mass.
 """
 
 from __future__ import annotations
@@ -26,6 +29,7 @@ from bilayer_core.forces.force_register import memory_size
 from bilayer_core.forces.mechanisms import REMEMBERED
 from bilayer_core.model.planarity import require_plane
 from bilayer_core.model.state import PARTS, State, initial_state
+from bilayer_core.scene.body import Guided
 from bilayer_core.simulation.stepper import Stepper
 
 Array = np.ndarray
@@ -36,8 +40,8 @@ FIRST_LOOK, MOST_STEPS = 8, 256
 or three."""
 CLEAR_OF_TURNING = 2.0
 """Times the rate at which a free robot's turning seems to grow: modes of a larger rate are others."""
-THIN = 1e-6
-"""Part of the larger moment of inertia that the smaller one has at least: a straight rod does not turn about itself."""
+QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])
+"""Turn of row vectors in the plane by 90°."""
 FASTEST = 1e9
 """Rate at which to leave off [1/s]."""
 
@@ -150,25 +154,57 @@ class PlaneWatch:
 
 
 def turning_rate(stepper: Stepper, state: State) -> float:
-    """Return the rate at which turning out of its plane seems to grow [1/s] for a robot that no prescribed body holds,
-    else 0.
+    """Return the rate at which turning out of its plane seems to grow [1/s] for a robot that no body holds which
+    cannot turn, else 0.
     """
     model, engine = stepper.model, stepper.engine
-    if np.any(model.constrained.free < 0):
+    if np.any(model.constrained.free < 0) or any(isinstance(body.motion, Guided) for body in model.scene.bodies):
         return 0.0
     from scipy.linalg import eigh  # when it is needed: runs in space, and short ones, never do
 
     engine.do_once(state, EVALUATE_STATE)
-    sums, axes, free = engine.sums, model.rods.axes, model.free_bodies.body_of_free
+    sums, axes, bodies = engine.sums, model.rods.axes, model.free_bodies
     unknowns = model.layout.node[:, None] + np.arange(3)
-    force, of_bodies = -sums.gradient[unknowns], -sums.body[: len(free), :3]
-    force[model.constrained.node] = -sums.attached
-    np.add.at(of_bodies, model.constrained.free, sums.attached)
-    mass = np.concatenate([model.rods.node_mass, model.free_bodies.mass])
-    place = np.concatenate([state.position, state.body_position[free]]) @ axes.T
-    place -= mass @ place / mass.sum()
-    force = np.concatenate([force, of_bodies]) @ axes.T
-    virial, inertia = force.T @ place, (mass[:, None] * place).T @ place
-    inertia += THIN * np.trace(inertia) * np.eye(2)
+    force = -np.concatenate([sums.gradient[unknowns], sums.body[: len(bodies.mass), :3]]) @ axes.T
+    place = np.concatenate([state.position, state.body_position[bodies.body_of_free]]) @ axes.T
+    mass, first, second = moments_of_turning(stepper, state)
+    inertia = second - np.outer(first, first) / mass
+    virial = force.T @ (place - first / mass)
     expansion = float(eigh(0.5 * (virial + virial.T), inertia, eigvals_only=True)[-1])
     return math.sqrt(max(0.0, expansion))
+
+
+def moments_of_turning(stepper: Stepper, state: State) -> tuple[float, Array, Array]:
+    """Return the mass [kg], its first moment [kg m], shape (2,), and J [kg m²], shape (2, 2), of small motions out of
+    the plane, z = φ·s with s from the origin along the plane's axes. The configuration is that evaluated last.
+    """
+    model, at = stepper.model, stepper.engine.end
+    rods, raised, fluid, bodies, axes = model.rods, model.raised, model.fluid, model.free_bodies, model.rods.axes
+    place, edges = state.position @ axes.T, rods.edge_count
+    of_bodies = state.body_position[bodies.body_of_free] @ axes.T
+    mass, moved = np.concatenate([rods.node_mass, bodies.mass]), np.concatenate([place, of_bodies])
+    across = at.tangent[:edges] @ axes.T @ QUARTER  # spin of edges about their tangents at the rate φ
+    spinning = rods.spin_inertia.copy()
+    raises = np.zeros((edges, 2))
+    total, first = mass.sum(), mass @ moved
+    second = (mass[:, None] * moved).T @ moved
+    if raised.exists:
+        node, director = rods.edge_node[raised.edge], at.director1[raised.edge] @ axes.T
+        raises[raised.edge] = raised.middle[:, None] * director
+        halves = raised.first_moment
+        along = halves[:, :1] * place[node] + halves[:, 1:] * place[node + 1]
+        along += 0.5 * raised.second_moment[:, None] * director
+        first += halves.sum(axis=1) @ director
+        second += along.T @ director + director.T @ along
+    if fluid.exists:
+        spinning += fluid.mass[:, 2]
+        for end in range(2):
+            half, wet = 0.5 * fluid.mass[:, 1], place[fluid.edge_node + end] + raises
+            total, first = total + half.sum(), first + half @ wet
+            second += (half[:, None] * wet).T @ wet
+    second += (spinning[:, None] * across).T @ across
+    rotation = state.body_rotation[bodies.body_of_free]
+    spread = (rotation @ bodies.second_moment @ rotation.transpose(0, 2, 1)).sum(axis=0)
+    in_plane = axes @ spread @ axes.T
+    second += in_plane + (np.trace(spread) - np.trace(in_plane)) * np.eye(2)
+    return total, first, second

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from support.evaluations import end_of_step, left_of_step, undriven
 from support.fluid_energy import energy_of_fluid, momentum_of_fluid, survey_fluid
-from support.sample_scenes import fixed, layer, rod, scene
+from support.sample_scenes import GEL, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.build_model import build_model
+from bilayer_core.model.records.step import AT_REST, IN_MOTION, LOOKED_AT
 from bilayer_core.model.section import rectangle
 from bilayer_core.model.state import initial_state
 
@@ -21,6 +22,8 @@ ADDED = 0.25 * math.pi * 1000.0 * WIDTH**2
 TURNING = math.pi / 128 * 1000.0 * (WIDTH**2 - THICKNESS**2) ** 2
 SIDEWAYS = 0.25 * math.pi * 1000.0 * THICKNESS**2
 WHOLE, HALVES = [layer(thickness=THICKNESS)], [layer("bottom"), layer("top")]
+UNLIKE = [layer("slab"), layer("film", 1e-4) | {"material": "film"}]
+TWO = {"gel": GEL, "film": GEL | {"youngs_modulus": 1e10}}
 
 
 def water(**more):
@@ -297,3 +300,58 @@ def test_forces_of_the_fluid_act_along_the_directions_at_the_end_of_the_step(add
     assert evaluator.speed(*left_of_step(evaluator, end)) < simulator.scene.solver.newton_tolerance
     evaluator.update_lagged(start)
     assert evaluator.speed(*left_of_step(evaluator, end)) > 100.0 * simulator.scene.solver.newton_tolerance
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("looked_at", [AT_REST, LOOKED_AT], ids=["at rest", "in motion"])
+@pytest.mark.parametrize("strip", [HALVES, UNLIKE], ids=["alike", "unlike"])
+def test_the_stiffness_of_a_flow_is_that_of_its_energy_at_held_velocities(strip, looked_at, dimension):
+    """−∂²T/∂q² along directions v, by second differences of T, at random shapes and velocities."""
+    rng = np.random.default_rng(3)
+    flow = water(velocity=[0.1, 0.0 if dimension == 2 else -0.2, 0.05])
+    bent_strip = scene([rod(strip, length=0.02, stations=7)], fluid=flow, materials=TWO)
+    model = build_model(load_scene(bent_strip), "laminate", dimension)
+    evaluator, state = Evaluator(model), initial_state(model)
+    start, at, moved = (evaluator.new() for _ in range(3))
+    evaluator.take_state(state, start)
+    in_plane = np.array([1.0, dimension == 3, 1.0])
+
+    def motion():
+        return rng.standard_normal((model.node_count, 3)) * in_plane
+
+    def turn():
+        return rng.standard_normal(model.rods.edge_count) * (dimension == 3)
+
+    at.position[:] = start.position + 4e-4 * motion()
+    evaluator.transport_frames(start, 0.3 * turn(), at)
+    if looked_at == LOOKED_AT:
+        state.velocity[:] = motion() * 0.3
+    kept = rng.standard_normal((model.kept_directors, 3)) * in_plane * (looked_at == LOOKED_AT)
+    state.strain_rate[:] = kept.ravel()
+    rest, load_factor = undriven(model)
+    matrices = []
+    for still in (IN_MOTION, looked_at):
+        evaluator.stand_still(state, at, 1.0, rest.edge, rest.joint, load_factor)
+        evaluator.stage.still[0] = still
+        evaluator.start_stage(at)
+        evaluator.evaluate(at, ("added mass",), second=True)
+        band = evaluator.assemble(at)[0].copy()
+        size = model.solved_layout.size
+        lower = sum(np.diag(band[: size - r, r], -r) for r in range(min(band.shape[1], size)))
+        matrices.append(lower + np.tril(lower, -1).T)
+    found = matrices[1] - (matrices[0] if looked_at == LOOKED_AT else 0.0)
+    no_spin = np.zeros(model.rods.edge_count)
+
+    def energy(position, angle):
+        moved.position[:] = at.position + position
+        evaluator.transport_frames(at, angle, moved)
+        return energy_of_fluid(model, moved, state.velocity, no_spin, kept)
+
+    for _ in range(3):
+        shift, angle, h = 1e-3 * motion(), turn(), 1e-4
+        unknowns = np.zeros(size)
+        unknowns[model.solved_layout.node[:, None] + np.arange(dimension)] = shift @ model.rods.axes.T
+        if dimension == 3:
+            unknowns[model.rods.edge_unknown] = angle
+        second = energy(h * shift, h * angle) - 2.0 * energy(0.0, no_spin) + energy(-h * shift, -h * angle)
+        assert unknowns @ found @ unknowns == pytest.approx(-second / h**2, rel=1e-5)

@@ -8,7 +8,8 @@ from support.sample_scenes import GEL, fixed, layer, rod, scene
 from bilayer_core import Simulator, load_scene
 from bilayer_core.model.section import sections
 from bilayer_core.model.state import initial_state
-from bilayer_core.simulation.growing_modes import _Linearised, growing_modes
+from bilayer_core.simulation.growing_modes import growing_modes
+from bilayer_core.simulation.linearised import Linearised
 from bilayer_core.verification.validate.stability import BECK, column
 
 SLOW = 1e-3
@@ -69,7 +70,7 @@ def test_the_roll_of_a_rod_at_a_body_without_mass_counts_once(stations):
     hub = {"name": "hub", "position": [0.1, 0, 0], "motion": {"type": "guided", "hinge": [1, 0, 0]}}
     scene_ = load_scene(scene([strip], bodies=[fixed("wall"), hub]))
     model = Simulator(scene_, dimension=3).model
-    matrices = _Linearised(model, initial_state(model), np.zeros(0), None)
+    matrices = Linearised(model, initial_state(model), np.zeros(0))
     section = sections(scene_.rods[0], scene_.rods[0].layers[0], scene_.materials["gel"], np.array([0.0]))
     expected = 0.5 * np.pi / 0.1 * np.sqrt(section.twisting_stiffness[0] / section.spin_inertia[0])
     squares = np.linalg.eigvals(np.linalg.solve(matrices.mass.toarray(), matrices.stiffness.toarray()))

@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 from support.planar_scenes import snap
-from support.sample_scenes import GROUND, contact, layer, rod, scene
+from support.sample_scenes import GEL, GROUND, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.model.plan import MODELS
+from bilayer_core.simulation.linearised import Linearised
 from bilayer_core.simulation.plane_watch import FIRST_LOOK, MOST_STEPS, turning_rate
 from bilayer_core.verification.validate.plane import blade
 
@@ -127,3 +128,71 @@ def test_a_compressed_strip_that_flies_apart_seems_to_turn():
     stepper = simulator._in_dimension(2)
     stepper.evaluate(state)
     assert turning_rate(stepper, state) == pytest.approx(expected, rel=5e-3)
+
+
+ARM = rod(
+    [layer(thickness=2e-3)], length=0.05, stations=11, start=(0.05, 0, 0), clamp_start="hub", pattern={"count": 2}
+)
+HUB = {"name": "hub", "position": [0, 0, 0], "motion": {"type": "free", "mass": 1e-3, "inertia": [1e-6, 1e-4, 1e-4]}}
+SLAB = rod(
+    [layer("slab", thickness=4e-3), layer("film", thickness=1e-4) | {"material": "film"}], length=0.1, stations=21
+)
+FILM = {"gel": GEL, "film": GEL | {"youngs_modulus": 1e10, "density": 8000.0}}
+AROUND = {"drag_along": 0.0, "drag_across": 0.0, "added_mass": True}
+
+
+@pytest.mark.parametrize(
+    ("robot", "model"),
+    [
+        pytest.param(scene([ARM], bodies=[HUB]), "laminate", id="arms of a wide and heavy hub"),
+        pytest.param(scene([SLAB], materials=FILM), "laminate", id="unlike layers"),
+        pytest.param(scene([SLAB], materials=FILM), "two_rod", id="unlike layers, each a strand"),
+        pytest.param(scene([SLAB], materials=FILM, fluid=AROUND), "laminate", id="in a fluid"),
+    ],
+)
+def test_the_rate_at_which_turning_seems_to_grow_is_that_of_the_matrices_in_space(robot, model):
+    """−δᵀK δ/δᵀM δ of turns δ about the mass centre, of a robot that is shorter than it wants to be."""
+    simulator = Simulator(load_scene(robot), dimension=2, model=model)
+    state, stepper, space = simulator._state, simulator._in_dimension(2), simulator._in_dimension(3).model
+    gap = 0.05 if space.free_bodies.mass.size else 0.0
+    along = state.position[:, 0]
+    along[:] = np.sign(along) * (gap + (np.abs(along) - gap) * (1.0 - 1e-3))
+    told = turning_rate(stepper, state)
+    matrices = Linearised(space, state, np.zeros(0))
+    motions = matrices.chosen.T @ np.stack(list(rigid_motions(space, matrices.at)), axis=1)
+    stiffness, mass = (motions.T @ of @ motions for of in (matrices.stiffness, matrices.mass))
+    about_centre = mass[:2, :2] - np.outer(mass[:2, 2], mass[2, :2]) / mass[2, 2]
+    rates = np.linalg.eigvals(np.linalg.solve(about_centre, -stiffness[:2, :2])).real
+    assert told == pytest.approx(np.sqrt(rates.max()), rel=1e-8)
+
+
+def rigid_motions(model, at):
+    """Turns about x and z, and the shift along y, as motions of unknowns and bodies."""
+    size, first = model.layout.size, model.layout.node[:, None] + np.arange(3)
+    for turn, shift in ([1, 0, 0], [0, 0, 0]), ([0, 0, 1], [0, 0, 0]), ([0, 0, 0], [0, 1, 0]):
+        motion = np.zeros(size)
+        motion[first] = np.cross(turn, at.position) + shift
+        motion[model.layout.attached[:, None] + np.arange(3)] = 0.0
+        motion[model.rods.edge_unknown] = at.tangent[: model.rods.edge_count] @ turn
+        bodies = [np.concatenate([np.cross(turn, place) + shift, turn]) for place in at.body_position]
+        yield np.concatenate([motion, *bodies])
+
+
+@pytest.mark.parametrize(("part", "leaves"), [(0.9, False), (1.5, True)])
+def test_a_run_tells_that_a_flow_along_a_blade_would_turn_it_sideways(part, leaves):
+    """M U² = π² EI/4 L² across the blade, which is thicker than wide: M = ρ π h²/4."""
+    width, height, length, modulus = 1e-3, 1e-2, 0.1, 1e6
+    compression = 0.25 * np.pi**2 * modulus * height * width**3 / 12.0 / length**2
+    speed = np.sqrt(part * compression / (0.25 * np.pi * 1000.0 * height**2))
+    blade = rod([layer(thickness=height)], length=length, stations=21, width=width, clamp_start="wall")
+    content = scene(
+        [blade],
+        bodies=[fixed("wall")],
+        materials={"gel": GEL | {"youngs_modulus": modulus}},
+        fluid=AROUND | {"velocity": [speed, 0, 0]},
+        duration=20.0,
+    )
+    simulator = Simulator(load_scene(content), dimension=2)
+    simulator.run()
+    assert bool(warnings_of(simulator)) == leaves
+    assert (growth_in_space(load_scene(content), 20.0) > 100.0) == leaves

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from bilayer_core.jit.record import CHANGES, Indices, Matrix, Stack, Tensor, Vector, record
 
+IN_MOTION, AT_REST, LOOKED_AT = 0.0, 1.0, 2.0
+"""What displacements in a stage are: motion; none, where rest is looked for; motion whose stability is looked at."""
+
 
 @record
 class Configuration:
@@ -55,7 +58,7 @@ class Stage:
         3,
         3,
     )  # likewise; R̄ is no rotation: (R − R̄)/(γ h) is dR/dt
-    still: Vector = (1,)  # 1 where rest is looked for and displacements are no motion, else 0
+    still: Vector = (1,)  # `IN_MOTION`, `AT_REST` or `LOOKED_AT`
     origin_fluid_momentum: Matrix = ("wet", 3)  # P̄ of the fluid as in `Fluid.momentum` [N s]; none without added mass
     predicted_director: Matrix = ("raised", 3)  # of raised edges, as a vector that inertia takes along
     predicted_position: Matrix = ("node", 3)  # x̃ of nodes [m]
