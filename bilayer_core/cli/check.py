@@ -41,6 +41,7 @@ def _report(simulator) -> dict[str, Any]:
     """Return a description of the planned computation, as the content of ``check --json``."""
     from bilayer_core.log.messages.topics import Rate, output_topics
     from bilayer_core.model.findings import told
+    from bilayer_core.model.immersed import missing_wake
     from bilayer_core.model.impacts import impact_warnings
     from bilayer_core.model.twisted import twist_figures
     from bilayer_core.model.undamped_friction import unseen_vibrations
@@ -80,7 +81,7 @@ def _report(simulator) -> dict[str, Any]:
         ],
         "log": {"bytes_per_second": round(size.per_second), "bytes": round(size.total)},
         "within_validity": list(told(figure for figure in figures if not figure.outside)),
-        "unseen": list(unseen_vibrations(scene)),
+        "unseen": [*unseen_vibrations(scene), *missing_wake(scene.fluid)],
         "warnings": [*plan.warnings, *told(impact_warnings(model)), *simulator.start_warnings],
     }
 

@@ -16,6 +16,16 @@ from bilayer_core.scene.rod import Rod
 Array = np.ndarray
 
 
+def missing_wake(fluid: config.Fluid | None) -> tuple[str, ...]:
+    """Return what added mass in a flow leaves out, as a line; none where nothing flows about added mass."""
+    if fluid is None or fluid.added_mass is None or not any(fluid.velocity):
+        return ()
+    return (
+        "the wake that leaves the tail of a rod: along a flow about added mass a tail diverges, where one with a wake "
+        "flutters at a higher speed",
+    )
+
+
 def add_fluid(found: Collected, fluid: config.Fluid | None, rod: Rod, copies: list[list[Span]]) -> None:
     """Add what a fluid does to copies of a rod, each with one strand for each layer, or one for all."""
     if fluid is None:

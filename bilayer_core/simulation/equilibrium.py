@@ -6,8 +6,9 @@ where ∂V/∂q = 0; h grows tenfold while Newton's method succeeds, so that the
 What depends on velocities vanishes there: friction, mass damping, and drag but for that of a fluid which flows. About
 added mass a flow has a potential (`forces.added_mass`).
 Forces that turn with what they act on, moments on bodies and light are taken at q_k and agree with the shape in the
-end. Whether the equilibrium is stable is asked of V, or of the modes of small motions where forces have no potential
-(`simulation.growing_modes`).
+end. Where a round does not converge under such forces, Newton's method with all of their stiffness looks for
+rest (`simulation.following_newton`). Whether the equilibrium is stable is asked of V, or of the modes of small motions
+where forces have no potential (`simulation.growing_modes`).
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ FIRST, GROWTH, SHRINKAGE, SHORTEST = 1e-2, 10.0, 0.25, 1e-7
 CAREFUL_GROWTH = 1.3
 """In place of growth once a round has failed, where forces turn with what they act on. Their part of the stiffness is
 not in the Hessian, so Newton converges for lengths h alone in which inertia outweighs it; rest is reached round by
-round."""
+round, if at all."""
 LONGEST_AFTER_FAILURE = 0.6
 """Of the length of a round that failed with careful growth: Newton converges up to there, and rounds of one length come
 to rest geometrically."""
@@ -131,9 +132,9 @@ def follows(model: Model) -> bool:
     return model.followers.exists or model.moments.exists or flowing
 
 
-def _carries_flow(model: Model) -> bool:
-    """Return whether a flow has momentum about added mass: its gyroscopic force is in no matrix of modes."""
-    return model.fluid.exists and bool(np.any(model.fluid.velocity))
+def _may_touch(model: Model) -> bool:
+    """Return whether anything of a scene may touch anything."""
+    return not {"barrier", "rod barrier"}.isdisjoint(model.forces)
 
 
 def _rods_touch(engine: Engine) -> bool:
@@ -173,6 +174,7 @@ class _Search:
         self.light = light_of(model)
         self._drive(stepper)
         self.rounds = self.iterations = self.factorisations = 0
+        self.sought = False
         self.growth_after_failure = CAREFUL_GROWTH if follows(model) else GROWTH
 
     def _drive(self, stepper: Stepper) -> None:
@@ -188,7 +190,7 @@ class _Search:
 
     def run(self) -> StaticReport:
         state, engine = self.state, self.stepper.engine
-        first_position, start = state.position.copy(), state.copy()
+        begin, start = state.copy(), state.copy()
         length, moved, before, settled, growth, longest = FIRST, math.inf, math.inf, 0, GROWTH, LONGEST
         while self.rounds < MAX_ROUNDS:
             if self.light.exists:
@@ -205,13 +207,16 @@ class _Search:
                     raise self._failure(self._why(attempt), moved)
                 continue
             moved, before = engine.moved, moved
-            if np.abs(state.position - first_position).max() > OUT_OF_SIGHT * self.size:
+            if np.abs(state.position - begin.position).max() > OUT_OF_SIGHT * self.size:
                 raise self._failure("nothing holds the robot, or not all of it", moved)
             start.take(state)
             if not attempt.converged:  # V has fallen all the same
                 if growth == CAREFUL_GROWTH:
                     longest = min(longest, LONGEST_AFTER_FAILURE * length)
                 length, settled, growth = SHRINKAGE * length, 0, self.growth_after_failure
+                if growth == CAREFUL_GROWTH and self._find_rest(begin, length):
+                    start.take(state)
+                    length = longest
                 continue
             enough, longest = min(SETTLED, longest), min(RECOVERY * longest, LONGEST)
             at_rest = length >= enough and moved <= self.tolerance
@@ -221,10 +226,33 @@ class _Search:
             if settled == 2:
                 return self._report(attempt.residual * length)
             length = max(enough, length) if moved <= self.tolerance else min(growth * length, longest)
-        hint = (
-            ": forces that follow it have no potential; a run may come to rest" if follows(self.stepper.model) else ""
-        )
+        hint = ": forces that follow it have no potential; look from where a run comes to rest"
+        hint = hint if follows(self.stepper.model) else ""
         raise self._failure(f"the shape does not come to rest{hint}", moved)
+
+    def _find_rest(self, begin: State, length: float) -> bool:
+        """Look for rest with the stiffness of forces that follow (`following_newton`), once, and where nothing may
+        touch: from where rounds are, then from where they began, which may be where a run came to rest. Rounds have to
+        confirm it.
+        """
+        if self.sought or self.light.exists or _may_touch(self.stepper.model):
+            return False
+        from bilayer_core.simulation.following_newton import find_rest  # brings scipy's sparse solvers
+
+        self.sought = True
+        within = None if self.in_space is None else self.stepper.model
+        space = self.stepper if self.in_space is None else self.in_space()
+        load_factor = self.stepper.surroundings.load_factor(self.state, self.ended)
+        now = self.state.copy()
+        for first, h in ((now, length), (begin, SETTLED)):
+            self.state.take(first)
+            steps = find_rest(space.model, self.state, load_factor, within, h, self.tolerance)
+            self.iterations += steps
+            self.factorisations += steps
+            if steps > 0:
+                return True
+        self.state.take(now)
+        return False
 
     def _why(self, attempt: IntegrationReport) -> str:
         """Return why a round failed."""
@@ -242,7 +270,7 @@ class _Search:
             self._drive(space)
             in_plane, unstable = unstable, self._unstable(space)
             out_of_plane = unstable - in_plane
-        if follows(space.model) and not (_rods_touch(space.engine) or _carries_flow(space.model)):
+        if follows(space.model) and not _rods_touch(space.engine):
             from bilayer_core.simulation.growing_modes import growing_modes  # brings scipy's sparse solvers
 
             load_factor = self.stepper.surroundings.load_factor(self.state)

@@ -31,7 +31,7 @@ HELD = ("followers", "moments", "drag")
 """Forces that are held at a configuration while Newton's method goes on."""
 ADDED_MASS = "added mass"
 STEP = 1e-6
-"""Of the longest rod, or of one radian: differences of the configuration at which such forces are held."""
+"""Of the longest rod, or of one radian: differences of the configuration at which such forces are held, by default."""
 STRIDE = 6
 """Nodes apart from each other that no held force sees together: each sees two of its neighbours on either side."""
 LONG = 1e9
@@ -51,6 +51,8 @@ class Linearised:
         Of loads there, shape (n_load,).
     within : Model, optional
         Of the same scene in a plane: motions that do not leave it alone are free.
+    step : float
+        In place of `STEP`.
 
     Attributes
     ----------
@@ -59,7 +61,8 @@ class Linearised:
         Motion of unknowns and bodies in each free motion, a column each.
     """
 
-    def __init__(self, model: Model, state: State, load_factor: Array, within: Model | None = None):
+    def __init__(self, model: Model, state: State, load_factor: Array, within: Model | None = None, step: float = STEP):
+        self._step = step
         self._model, self._load_factor, self._state = model, load_factor, state
         self._evaluator = evaluator = Evaluator(model)
         self.at: Configuration = evaluator.new()
@@ -101,6 +104,10 @@ class Linearised:
         """Move along the free motions."""
         self._stand(LONG, rests=True)
         self._move(self.chosen @ step)
+        self.go_back()
+
+    def go_back(self) -> None:
+        """Return to where the last move began, if nothing was differentiated since."""
         self.at, self._moved = self._moved, self.at
 
     def displacement(self, step: Array) -> float:
@@ -178,7 +185,7 @@ class Linearised:
         evaluator, model = self._evaluator, self._model
         size, whole = model.layout.size, model.layout.size + 6 * len(model.free_bodies.mass)
         span = max(rod.path.length for rod in model.scene.rods)
-        steps, place = np.full(whole, STEP), np.full(whole, np.inf)
+        steps, place = np.full(whole, self._step), np.full(whole, np.inf)
         nodes, edges = model.layout.node[:, None] + np.arange(3), model.rods.edge_unknown
         steps[nodes] *= span
         steps[size:].reshape(-1, 6)[:, :3] *= span

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.integrate import solve_bvp
 
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
@@ -24,6 +25,8 @@ ADDED = {
 AXES = {"through": 2, "sideways": 1, "along": 0}
 WATER = {"drag_along": 0.0, "drag_across": 0.0, "added_mass": True}
 LENGTH, EDGES = 0.05, 10
+SOFT, SOFT_LENGTH, SOFT_THICKNESS, ALONG, ACROSS = 1e6, 0.1, 1e-3, 0.05, 2.0
+"""Of a strip across a flow: modulus [Pa], length and thickness [m], coefficients of drag."""
 
 
 WHOLE, HALVES = [layer(thickness=THICKNESS)], [layer("bottom"), layer("top")]
@@ -100,7 +103,63 @@ def sinking_ball() -> tuple[float, float]:
     return -float(simulator._state.body_velocity[1, 2]), terminal * math.tanh(gravity * time / terminal)
 
 
+def across_a_flow(speed: float, added: bool) -> tuple[float, float]:
+    """Return how far the tip of a soft cantilever across a flow bends along it [m], at rest."""
+    content = scene(
+        [rod([layer(thickness=SOFT_THICKNESS)], SOFT_LENGTH, 81, clamp_start="wall")],
+        bodies=[fixed("wall")],
+        materials={"gel": {**GEL, "youngs_modulus": SOFT}},
+        fluid={"drag_along": ALONG, "drag_across": ACROSS, "velocity": [0.0, 0.0, speed], "added_mass": added},
+        solver={"dimension": 2},
+    )
+    simulator = Simulator(load_scene(content))
+    simulator.solve_static()
+    return float(simulator.positions[-1, 2]), strip_across_a_flow(speed, added)
+
+
+def strip_across_a_flow(speed: float, added: bool) -> float:
+    """Return the same of an extensible elastica, by collocation and continuation in the speed.
+
+    EI θ″ = m₁ a c − (1 + ε) N·n, N′ = −½ ρ w (C∥ |c| c t + C⊥ |a| a n), ε = N·t/EA, with c = U·t, a = U·n and added
+    mass m₁ per length; x′ = (1 + ε) t; clamped at 0, free at L.
+    """
+    stretching, bending = SOFT * WIDTH * SOFT_THICKNESS, SOFT * WIDTH * SOFT_THICKNESS**3 / 12.0
+    half, mass = 0.5 * DENSITY * WIDTH, added * ADDED["through"]
+    solved = None
+    for flow in (*(part for part in (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7) if part < speed), speed):
+
+        def slopes(_: np.ndarray, y: np.ndarray, flow: float = flow) -> np.ndarray:
+            angle, pull = y[1], y[3:]
+            tangent, normal = np.stack([np.cos(angle), np.sin(angle)]), np.stack([-np.sin(angle), np.cos(angle)])
+            along, across = flow * tangent[1], flow * normal[1]
+            drag = half * (ALONG * np.abs(along) * along * tangent + ACROSS * np.abs(across) * across * normal)
+            longer = 1.0 + (pull * tangent).sum(axis=0) / stretching
+            turning = (mass * across * along - longer * (pull * normal).sum(axis=0)) / bending
+            return np.vstack([longer * tangent[1], y[2], turning, -drag])
+
+        def ends(start: np.ndarray, end: np.ndarray) -> np.ndarray:
+            return np.array([start[0], start[1], end[2], end[3], end[4]])
+
+        mesh, guess = (
+            (np.linspace(0.0, SOFT_LENGTH, 400), np.zeros((5, 400))) if solved is None else (solved.x, solved.y)
+        )
+        solved = solve_bvp(slopes, ends, mesh, guess, tol=1e-5, max_nodes=50_000)
+    if solved is None or solved.status != 0:
+        raise ArithmeticError("the elastica in a flow was not found")
+    return float(solved.y[0, -1])
+
+
 CASES = [
+    *(
+        Case(
+            f"fluid/strip across a flow/{speed:g} m/s, {'drag and added mass' if added else 'drag'}",
+            "extensible elastica, by collocation",
+            5e-4,
+            lambda speed=speed, added=added: across_a_flow(speed, added),
+            "m",
+        )
+        for speed, added in ((0.1, True), (0.3, False), (0.5, True), (1.0, False))
+    ),
     *(
         Case(
             f"fluid/turning strip/{name}",
