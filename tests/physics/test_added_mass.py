@@ -12,6 +12,7 @@ from bilayer_core import Simulator, load_scene
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.build_model import build_model
+from bilayer_core.model.immersed import missing_wake
 from bilayer_core.model.records.step import AT_REST, IN_MOTION, LOOKED_AT
 from bilayer_core.model.section import rectangle
 from bilayer_core.model.state import initial_state
@@ -355,3 +356,13 @@ def test_the_stiffness_of_a_flow_is_that_of_its_energy_at_held_velocities(strip,
             unknowns[model.rods.edge_unknown] = angle
         second = energy(h * shift, h * angle) - 2.0 * energy(0.0, no_spin) + energy(-h * shift, -h * angle)
         assert unknowns @ found @ unknowns == pytest.approx(-second / h**2, rel=1e-5)
+
+
+def test_only_a_flow_about_added_mass_lacks_a_wake():
+    for fluid, told in (
+        (None, False),
+        (water(), False),
+        (water(velocity=[0.1, 0, 0], added_mass=False), False),
+        (water(velocity=[0.1, 0, 0]), True),
+    ):
+        assert any("wake" in line for line in missing_wake(load_scene(scene([rod(WHOLE)], fluid=fluid)).fluid)) == told
