@@ -17,21 +17,44 @@ from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.rod import Rod
 
 MOMENTS = ("first_moment", float, 2), ("second_moment",)
+LAST_CELL = np.array([1.5, 1.0, 1.5])
+"""Compliance of a joint with the half edge to the end, of its own, about m2, m1 and t."""
 
 
 def add_point_masses(scene: SceneConfig, found: Collected) -> None:
     """Add point masses to the masses of nodes [kg], and where they are off the curve to the moments of half edges."""
     node_mass, first, second = (found.column(*of) for of in (("node_mass",), MOMENTS[0], MOMENTS[1]))
+    raised: list[np.ndarray] = []
     for point in scene.masses:
         for rod, spans, height in _copies(scene, found, point.rod):
             nodes, shares = _shares(rod, spans, point.position)
             np.add.at(node_mass, nodes, point.mass * shares)
             if height:
+                raised.append(nodes)
                 edges, halves, parts = (of.ravel() for of in halves_at(found, nodes))
                 masses = parts * np.repeat(point.mass * shares, 2)
                 np.add.at(first, (edges, halves), height * masses)
                 np.add.at(second, edges, height**2 * masses)
+    if raised:
+        _soften_ends(found, np.concatenate(raised))
     found.columns |= {"node_mass": [node_mass], "first_moment": [first], "second_moment": [second]}
+
+
+def _soften_ends(found: Collected, nodes: np.ndarray) -> None:
+    """Give the last joints before free ends among nodes the compliance of the half edge beyond the last edge's middle.
+
+    A mass off the curve at an end exerts a moment M by its inertia, and moves with m1 at the end, where the last edge
+    has that of its middle: M l/2EI of turn is missing, an error of first order. With 1.5 times the compliance in
+    bending about m2 and in twist, the last edge has the direction of the end, since M is all but uniform there; nodes
+    move by M l²/2EI, at second order. Turns at rest stay as they are.
+    """
+    nodes = np.setdiff1d(nodes, found.column("attached_node", np.int64))
+    edges, edge_node = found.column("node_edges", np.int64, 2)[nodes], found.column("edge_node", np.int64)
+    ends = edges[:, 0] == edges[:, 1]
+    beside = 2 * edge_node[edges[ends, 0]] + 1 - nodes[ends]
+    stiffness = found.column("joint_stiffness", width=3)
+    stiffness[np.isin(found.column("joint_node", np.int64), beside)] /= LAST_CELL
+    found.columns["joint_stiffness"] = [stiffness]
 
 
 def edges_of_loads(scene: SceneConfig, found: Collected) -> np.ndarray:

@@ -11,6 +11,7 @@ from support.sample_scenes import GEL, everything, fixed, layer, rod, scene
 from bilayer_core import Simulator, load_scene
 from bilayer_core.model.build_model import build_model
 from bilayer_core.model.state import turn_directors
+from bilayer_core.verification.validate.unlike import frequency_with_mass
 
 FORCES = ("inertia", "damping", "gravity", "loads", "followers", "drag", "added mass")
 HUBS = {
@@ -180,3 +181,11 @@ def test_a_state_whose_velocities_someone_sets_has_directors_that_turn_with_them
     height = model.start_position[0, 2] + model.raised.first_moment.sum() / model.rods.node_mass.sum()
     mass = density * width * 4e-3 * length
     assert simulator.momentum == pytest.approx(20.0 * mass * np.array([height, 0.0, -x]), rel=1e-12)
+
+
+@pytest.mark.parametrize(("mode", "limit"), [(0, 2e-4), (1, 2e-3), (2, 5e-4)])
+def test_vibrations_with_a_mass_off_the_axis_at_the_end_converge_at_second_order(mode, limit):
+    """Bending twice and stretching, which turns the end by its moment: 0.95 without the half edge beyond the last."""
+    coarse, fine = (abs(found / expected - 1.0) for found, expected in (frequency_with_mass(mode, n) for n in (41, 81)))
+    assert fine < limit
+    assert np.log2(coarse / fine) == pytest.approx(2.0, abs=0.1)

@@ -10,8 +10,12 @@ from functools import cache
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.linalg import eigh
+from scipy.optimize import brentq
 
+from bilayer_core.model.build_model import build_model
 from bilayer_core.scene.loader import load_scene
+from bilayer_core.simulation.linearised import Linearised
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.motion import let_go
 from bilayer_core.verification.validate.parts import fixed, layer, rod, scene
@@ -132,6 +136,41 @@ def point_mass() -> tuple[float, float]:
     weight = np.array([[mass * GRAVITY], [0.0]])
     answer = end_of_rod([(LENGTH, section)], ALONG, end=lambda angle: weight + 0.0 * angle)
     return 1e3 * end_of(simulator, section.axis)[1], 1e3 * answer[1]
+
+
+def frequency_with_mass(mode: int, stations: int = EDGES + 1) -> tuple[float, float]:
+    """Return a frequency of a cantilever with a mass of five times its own on its path, off the axis [rad/s].
+
+    With β⁴ = ρA ω²/EI, k² = ρA ω²/EA and the height e of the path over the axis, w = C₁ (cosh − cos) + C₂ (sinh − sin)
+    of β x, u = C₃ sin k x, and at the end EA u′ = m ω² (u − e w′), EI w″ = −e m ω² (u − e w′), −EI w‴ = m ω² w.
+    """
+    section = Section(WIDTH, (1e8, 1e8), (1000.0, 1000.0), (1e-3, 4e-3))
+    mass, linear = 5.0 * section.mass * LENGTH, section.mass
+    point = {"name": "lead", "rod": "rod", "position": LENGTH, "mass": mass}
+    simulator = Simulator(load_scene(scene_of(section, stations - 1, masses=[point])))
+    space = build_model(simulator.scene, "laminate", 3)
+    matrices = Linearised(space, simulator._state, np.zeros(0), simulator.model)
+    found = np.sqrt(eigh(matrices.stiffness.toarray(), matrices.mass.toarray(), eigvals_only=True)[mode])
+    stretching, bending, height = 1e8 * WIDTH * 5e-3, section.bending, 1.5e-3
+
+    def at_end(frequency: float) -> float:
+        k, beta = frequency * math.sqrt(linear / stretching), (linear * frequency**2 / bending) ** 0.25
+        x, load = beta * LENGTH, mass * frequency**2
+        cosh, sinh, cos, sin = math.cosh(x), math.sinh(x), math.cos(x), math.sin(x)
+        across, turn = np.array([cosh - cos, sinh - sin]), beta * np.array([sinh + sin, cosh - cos])
+        bend, shear = beta**2 * np.array([cosh + cos, sinh + sin]), beta**3 * np.array([sinh - sin, cosh + cos])
+        along, strain = math.sin(k * LENGTH), k * math.cos(k * LENGTH)
+        rows = [
+            np.array([stretching * strain - load * along, *(load * height * turn)]) * LENGTH / stretching,
+            np.array([height * load * along, *(bending * bend - height**2 * load * turn)]) * LENGTH**2 / bending,
+            np.array([0.0, *(bending * shear + load * across)]) * LENGTH**3 / bending,
+        ]
+        return float(np.linalg.det(rows)) / cosh**2
+
+    tried = np.linspace(5.0, 3000.0, 3000)
+    signs = np.sign([at_end(frequency) for frequency in tried])
+    first = tried[np.flatnonzero(np.diff(signs))[mode]]
+    return float(found), brentq(at_end, first, first + tried[1] - tried[0])
 
 
 def drag() -> tuple[float, float]:
@@ -291,6 +330,16 @@ CASES = [
         "mm",
     ),
     Case("unlike layers/point mass", "equilibrium along the path", LIMIT, point_mass, "mm"),
+    *(
+        Case(
+            f"unlike layers/mass off the axis at the end/{name}",
+            "Euler–Bernoulli beam that stretches, small vibrations",
+            LIMIT,
+            lambda mode=mode: frequency_with_mass(mode),
+            "rad/s",
+        )
+        for mode, name in ((0, "bending"), (2, "stretching"))
+    ),
     Case("unlike layers/drag along", "equilibrium along the path", LIMIT, drag, "mm"),
     Case("unlike layers/pendulum", "compound pendulum, by Runge–Kutta", LIMIT, pendulum, "rad"),
     Case(
