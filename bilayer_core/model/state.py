@@ -36,6 +36,8 @@ class State:
     ----------
     values : Array
         All parts in order, of which each is a view.
+    places : dict
+        Where each part begins and ends in `values`, and its shape.
     """
 
     time: Array  # simulated time [s], shape (1,); with fixed steps their number times dt, so that it does not drift
@@ -79,16 +81,14 @@ class State:
 
     def __post_init__(self):
         """Copy the parts into one piece."""
-        parts = [getattr(self, name) for name in PARTS]
-        self.values = np.concatenate([part.ravel() for part in parts])
-        start = 0
-        for name, part in zip(PARTS, parts, strict=True):
-            setattr(self, name, self.values[start : start + part.size].reshape(part.shape))
-            start += part.size
-            if name == "seal":
-                self.place_of_seal = start - 1
-            elif name == "override":
-                self.places_of_override = slice(start - part.size, start)
+        parts = {name: getattr(self, name) for name in PARTS}
+        self.values = np.concatenate([part.ravel() for part in parts.values()])
+        ends = np.cumsum([part.size for part in parts.values()]).tolist()
+        self.places = {
+            name: (end - part.size, end, part.shape) for (name, part), end in zip(parts.items(), ends, strict=True)
+        }
+        for name, (begin, end, shape) in self.places.items():
+            setattr(self, name, self.values[begin:end].reshape(shape))
 
     def copy(self) -> State:
         """Return an independent state with the same values."""
@@ -100,11 +100,11 @@ class State:
 
     def flat(self) -> Array:
         """Return all parts in order, as one array of float64, with a seal: what has one is as a run left it."""
-        return sealed(self.values, self.place_of_seal)
+        return sealed(self.values, self.places["seal"][0])
 
     def layout(self) -> tuple[tuple[str, tuple[int, ...]], ...]:
         """Return the name and shape of each part of `flat`."""
-        return tuple((name, getattr(self, name).shape) for name in PARTS)
+        return tuple((name, shape) for name, (_, _, shape) in self.places.items())
 
     def set_flat(self, flat: Array) -> bool:
         """Take all parts from a flat array; whether it is as `flat` made it, under the same conditions.
@@ -125,12 +125,12 @@ class State:
         if differs:
             raise InputError(f"saved state: is of another scene, with other {differs}; allowed to differ are {FREE}")
         finite = np.isfinite(flat)
-        finite[self.places_of_override] = True  # NaN is the scene's own stimulus
+        finite[slice(*self.places["override"][:2])] = True  # NaN is the scene's own stimulus
         bad = np.flatnonzero(~finite)
         if bad.size:
             raise InputError(f"saved state: value {bad[0]} is {flat[bad[0]]}, must be finite")
-        seal, conditions = flat[self.place_of_seal], self.conditions.copy()
-        flat[self.place_of_seal] = 0.0
+        place, conditions = self.places["seal"][0], self.conditions.copy()
+        seal, flat[place] = flat[place], 0.0
         self.values[:] = flat
         untouched = seal == zlib.crc32(flat) and np.array_equal(self.conditions, conditions)
         self.conditions[:] = conditions

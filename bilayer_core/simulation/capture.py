@@ -20,9 +20,9 @@ class Capture:
     def __init__(self, stepper: Stepper, state: State):
         self.model, self.owners = stepper.model, stepper.contact_owners
         self.seen, self.touching = stepper.observe(state)
-        self.values, self.place_of_seal = state.values.copy(), state.place_of_seal
+        self.values, self.places = state.values.copy(), state.places
         self.values.flags.writeable = False  # parts of it are handed out as they are
-        self.state = Parts(self.values, stepper.places_in(state))
+        self.state = Parts(self.values, self.places)
 
 
 _DERIVED: dict[str, Callable[[Capture], Any]] = {
@@ -41,7 +41,7 @@ _DERIVED: dict[str, Callable[[Capture], Any]] = {
     "com": lambda of: center_of_mass(of.model, of.state),
     "contacts": lambda of: of.owners.names_of(of.touching),
     "energy": lambda of: energies(of.model, of.seen),
-    "state": lambda of: sealed(of.values, of.place_of_seal),
+    "state": lambda of: sealed(of.values, of.places["seal"][0]),
 }
 """How attributes of a `Frame` are computed."""
 

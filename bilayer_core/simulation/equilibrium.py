@@ -28,7 +28,7 @@ from bilayer_core.model.lit_elements import light_of, part_seen
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.status import CROSSED, MAX_ITERATIONS
 from bilayer_core.model.state import NOT_KNOWN, State
-from bilayer_core.simulation.crossing_remedy import crossed, edge_of_strand
+from bilayer_core.simulation.crossing_remedy import crossing
 from bilayer_core.simulation.stepper import Stepper
 
 FIRST, GROWTH, SHRINKAGE, SHORTEST = 1e-2, 10.0, 0.25, 1e-7
@@ -256,10 +256,8 @@ class _Search:
 
     def _why(self, attempt: IntegrationReport) -> str:
         """Return why a round failed."""
-        if attempt.status != CROSSED:
-            return FAILURES[attempt.status]
-        edge, surface = crossed(self.stepper.model, attempt.pair)
-        return f"edge {edge_of_strand(self.stepper.model, edge)} goes through {surface} between its nodes"
+        crosses = attempt.status == CROSSED
+        return crossing(self.stepper.model, attempt.pair) if crosses else FAILURES[attempt.status]
 
     def _report(self, residual: float) -> StaticReport:
         rate = frequency = 0.0

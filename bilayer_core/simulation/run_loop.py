@@ -166,7 +166,8 @@ class RunLoop:
         found = self.integrate(1, until, math.inf)
         while whole and self._state.step[0] == before:
             found = found.followed_by(self.integrate(1, until, math.inf))
-        return StepReport.of(found, self._time, self._time - begin)
+        counts = found.done, found.rejected, found.iterations, found.factorisations
+        return StepReport(self._time, self._time - begin, *counts, found.largest_residual, found.inaccurate)
 
     def integrate(self, most: int, until: float, due: float) -> IntegrationReport:
         """Advance by at most so many steps or parts of them, to `until` [s] at the latest, and by none after one that

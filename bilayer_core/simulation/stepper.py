@@ -20,14 +20,13 @@ from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.integrators.method import Method
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.status import COLLAPSED, CROSSED, GAINS_ENERGY, INPUTS_END, TOO_INACCURATE
-from bilayer_core.model.records.step import Configuration
 from bilayer_core.model.state import NOT_KNOWN, State
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.simulation.collapse import collapsed
 from bilayer_core.simulation.contact_pairs import ContactOwners
-from bilayer_core.simulation.crossing_remedy import crossed, edge_of_strand
+from bilayer_core.simulation.crossing_remedy import crossing, edge_of_strand
 from bilayer_core.simulation.energy_budget import EnergyLedger
-from bilayer_core.simulation.parts import Parts, Places, places_in
+from bilayer_core.simulation.parts import Parts, Places
 from bilayer_core.simulation.remedies import remedy
 from bilayer_core.simulation.step_choice import Steps
 from bilayer_core.simulation.surroundings import Surroundings
@@ -65,25 +64,6 @@ class StepReport:
     residual: float
     inaccurate: int = 0
 
-    @classmethod
-    def of(cls, found: IntegrationReport, time: float, length: float) -> StepReport:
-        """Return the report of a step.
-
-        Parameters
-        ----------
-        found : IntegrationReport
-        time : float
-            At its end [s].
-        length : float
-            [s].
-
-        Returns
-        -------
-        StepReport
-        """
-        counts = found.done, found.rejected, found.iterations, found.factorisations
-        return cls(time, length, *counts, found.largest_residual, found.inaccurate)
-
 
 class Stepper:
     """Advances a `State` in time.
@@ -100,6 +80,8 @@ class Stepper:
     Attributes
     ----------
     surroundings : Surroundings
+    same_time : float
+        Two times that differ by no more are one [s].
     ledger : EnergyLedger or None
         Keeps the energy budget, if anything does; `begin_budget` comes before the first step.
 
@@ -115,7 +97,6 @@ class Stepper:
         self.engine = Engine(model, method, control, steps.newton_tolerance, max_iterations)
         self.engine.actuation = self.surroundings.actuation
         self.ledger: EnergyLedger | None = None
-        self._places: tuple[int, Places] = (-1, {})
 
     def _control_of(self, model: Model, steps: Steps) -> StepControl:
         """Take steps of a model, with what acts on it."""
@@ -127,8 +108,8 @@ class Stepper:
             )
         self.model, self.steps = model, steps
         first = min(steps.dt, steps.longest) if steps.adaptive else steps.dt
-        self._same = first * (TIME_ROUNDING if steps.adaptive else FIXED_ROUNDING)
-        self._same = max(self._same, LAST_DIGITS * model.scene.duration)
+        rounding = TIME_ROUNDING if steps.adaptive else FIXED_ROUNDING
+        self.same_time = max(first * rounding, LAST_DIGITS * model.scene.duration)
         self._first = first
         self.surroundings = Surroundings(model, ahead=2.0 * first)
         return StepControl(
@@ -140,7 +121,7 @@ class Stepper:
             least_travel=steps.least_travel,
             longest=steps.longest if steps.adaptive else steps.dt,
             output_rate=float(model.scene.output.rate),
-            same=self._same,
+            same=self.same_time,
         )
 
     def take_scene(self, scene: SceneConfig, steps: Steps, max_iterations: int) -> None:
@@ -157,16 +138,6 @@ class Stepper:
         if self.ledger is not None:
             self.ledger.begin(state, self.surroundings.load_factor(state))
 
-    @property
-    def same_time(self) -> float:
-        """Two times that differ by no more are one [s]."""
-        return self._same
-
-    @property
-    def end(self) -> Configuration:
-        """The configuration of the state after the last step or evaluation."""
-        return self.engine.end
-
     @cached_property
     def _observables(self) -> tuple[Observables, Places]:
         owners = self.contact_owners
@@ -179,12 +150,6 @@ class Stepper:
         found, places = self._observables
         self.engine.observe(state, found)
         return Parts(found.values.copy(), places), found.touching[: found.touching_count[0]].copy()
-
-    def places_in(self, state: State) -> Places:
-        """Return the places of the parts of a state in its values."""
-        if state.values.size != self._places[0]:
-            self._places = state.values.size, places_in(state)
-        return self._places[1]
 
     @cached_property
     def contact_owners(self) -> ContactOwners:
@@ -241,7 +206,7 @@ class Stepper:
             If none can be made; nothing is changed then.
         """
         begin = float(state.time[0])
-        if until <= begin + self._same:
+        if until <= begin + self.same_time:
             raise InputError(f"until: {until} is not allowed; it must be later than the present time, {begin} s")
         if self.ledger is not None:
             self.ledger.begin_step(state, self.surroundings.load_factor(state))
@@ -283,8 +248,7 @@ class Stepper:
             edge = f"edge {edge_of_strand(self.model, found.pair)}"
             return f"{edge} has less than {100 * LEAST_LENGTH:g} % of its length left in {end}"
         if found.status == CROSSED:
-            edge, surface = crossed(self.model, found.pair)
-            return f"edge {edge_of_strand(self.model, edge)} goes through {surface} between its nodes in {end}"
+            return f"{crossing(self.model, found.pair)} in {end}"
         text = f"{FAILURES[found.status]} in {end}"
         if found.status == GAINS_ENERGY:
             return f"{text} ({found.error:.3g} times what the account of energy allows)"

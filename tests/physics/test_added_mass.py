@@ -52,7 +52,7 @@ def thrown(motion, spin, dt, duration, integrator="implicit_euler", material=STI
 def momentum(simulator):
     """Of rods and fluid together [N s]."""
     model, state = simulator.model, simulator._state
-    fluid = momentum_of_fluid(model, simulator._stepper.end, state.velocity)
+    fluid = momentum_of_fluid(model, simulator._stepper.engine.end, state.velocity)
     return model.rods.node_mass @ state.velocity + (fluid + state.fluid_excess).sum(axis=0)
 
 

@@ -60,9 +60,9 @@ def test_wherever_the_curve_of_an_arch_lies_its_joints_have_the_same_angles(natu
     layers = [layer("bottom", natural_curvature=natural_curvature), growing(0.02, thickness=2e-3, natural_twist=3.0)]
     arc = {"shape": "arc", "start": [0, 0, 0], "direction": [1, 0, 0], "radius": 0.02, "angle": 2.0}
     content = scene([rod(layers, stations=41, clamp_start="wall") | {"path": arc}], bodies=[fixed()], stimuli=HEAT)
-    on_axis = settled(content)._stepper.end.joint_strain
+    on_axis = settled(content)._stepper.engine.end.joint_strain
     monkeypatch.setattr(laminate, "_axis", lambda _: -1e-3)
-    beside = settled(content)._stepper.end.joint_strain
+    beside = settled(content)._stepper.engine.end.joint_strain
     limits = np.array([2e-6, 1e-12, 1e-12])  # nodes are on the offset arc, not at the corners of the offset polygon
     assert np.all(np.abs(beside - on_axis).max(axis=0) < limits * np.abs(on_axis).max())
 
@@ -152,7 +152,7 @@ def test_natural_curvature_and_twist_are_means_weighted_with_stiffness():
     # about the axis at y₀ = ±1/4 mm: D = Σ EI + EA z², with E = 1 : 3
     bending = sum(e * (1 / 12 + z**2) for e, z in ((1.0, 0.75), (3.0, 0.25)))
     assert simulator.curvatures == pytest.approx(np.full(21, 12.0 / 12 / bending), rel=1e-9)
-    joints = simulator._stepper.end.joint_strain[:, 2] / simulator.model.voronoi_length
+    joints = simulator._stepper.engine.end.joint_strain[:, 2] / simulator.model.voronoi_length
     assert joints == pytest.approx(np.full(20, 6.0 / 4.0), rel=1e-9)
 
 

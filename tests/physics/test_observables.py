@@ -33,7 +33,7 @@ def strain_of(strand, edges):
 
 
 def test_strains_of_nodes_are_those_of_their_edges(simulator):
-    model, at, frame = simulator.model, simulator._stepper.end, simulator.frame()
+    model, at, frame = simulator.model, simulator._stepper.engine.end, simulator.frame()
     edges = at.length[: model.rods.edge_count] / model.rods.rest_length - 1.0
     a, b = model.rods.joint_a, model.rods.joint_b
     cosine = np.sum(at.tangent[a] * at.tangent[b], axis=1)
@@ -100,7 +100,7 @@ def test_energies_and_rotations_seen_are_those_of_the_state(simulator):
     assert frame.energy["kinetic"] == pytest.approx(kinetic_energy(model, state), rel=1e-12)
     if model.fluid.exists:
         moving = state.velocity, state.spin, director_rates(model, state)
-        of_fluid = energy_of_fluid(model, simulator._stepper.end, *moving)
+        of_fluid = energy_of_fluid(model, simulator._stepper.engine.end, *moving)
         assert frame.energy["fluid"] == pytest.approx(of_fluid, rel=1e-12)
     assert ("fluid" in frame.energy) == model.fluid.exists
     expected = [quaternion_from_matrix(of) for of in state.body_rotation]

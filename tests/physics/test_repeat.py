@@ -185,7 +185,7 @@ def test_gaps_of_near_pairs_are_those_of_the_present_list():
     listed = 0
     while simulator.time < 0.02:
         simulator.step(0.02)
-        surfaces, end = simulator._stepper.engine._storage.problem.surfaces, simulator._stepper.end
+        surfaces, end = simulator._stepper.engine._storage.problem.surfaces, simulator._stepper.engine.end
         for k in range(surfaces.near_count[0]):
             i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
             if surfaces.kind[s] == 0 and not surfaces.near_arm[k]:  # the ground

@@ -42,7 +42,7 @@ class Watched:
         curvature = np.abs(simulator.curvatures[: model.node_count]).max()
         stepper, state = simulator._stepper, simulator._state
         rest = self.evaluator.rest_strains_of(state.transduction).edge
-        strain = np.abs(stepper.end.length[: model.rods.edge_count] / model.rods.rest_length - 1.0 - rest).max()
+        strain = np.abs(stepper.engine.end.length[: model.rods.edge_count] / model.rods.rest_length - 1.0 - rest).max()
         self.curvature, self.strain = max(self.curvature, curvature), max(self.strain, strain)
         self.top = max(self.top, simulator.bodies["ball"].position[2])
 
