@@ -17,10 +17,9 @@ PARTS = ("node", "edge", "pair", "body", "contact")
 
 
 @dataclass(frozen=True)
-class Gradient:
-    """First derivatives of one force: shapes as in `model.records.problem.Sums`.
-
-    Of `contact`, rows of free bodies are zero, because theirs are in `body`.
+class EdgeVector:
+    """Displacement [m, rad] or velocity [m/s, rad/s] of everything that a force may differentiate by, or its first
+    derivatives by all that: shapes as in `model.records.problem.Sums`.
     """
 
     node: Array
@@ -29,41 +28,30 @@ class Gradient:
     body: Array
     contact: Array
 
-    @classmethod
-    def copy_of(cls, first: Sums, model: Model) -> Gradient:
-        """Return a copy of the present first derivatives."""
-        found = cls(*(getattr(first, part).copy() for part in PARTS))
-        found.contact[model.free_bodies.body_of_free] = 0.0
-        return found
-
-
-@dataclass(frozen=True)
-class Motion:
-    """Displacement [m, rad] or velocity [m/s, rad/s] of everything that a force may differentiate by: shapes as in
-    `model.records.problem.Sums`.
-    """
-
-    node: Array
-    edge: Array
-    pair: Array
-    body: Array
-    contact: Array
-
-    def work(self, gradient: Gradient) -> float:
+    def work(self, gradient: EdgeVector) -> float:
         """Return the work [J] of forces with a gradient over this displacement; power [W] if it is a velocity."""
         return -sum(float(np.vdot(getattr(gradient, part), getattr(self, part))) for part in PARTS)
 
 
-def compose(model: Model, node: Array, turn: Array, clamp_edge: Array, contact: Array) -> Motion:
+def gradient_of(first: Sums, model: Model) -> EdgeVector:
+    """Return a copy of the present first derivatives, with zeros in rows of `contact` of free bodies: theirs are in
+    `body`.
+    """
+    found = EdgeVector(*(getattr(first, part).copy() for part in PARTS))
+    found.contact[model.free_bodies.body_of_free] = 0.0
+    return found
+
+
+def compose(model: Model, node: Array, turn: Array, clamp_edge: Array, contact: Array) -> EdgeVector:
     """Return a motion from that of nodes, of edges about their tangents (n_edge,), of clamp edges (·, 4), of bodies."""
     i = model.rods.edge_node
     edge = np.concatenate([np.column_stack([node[i + 1] - node[i], turn]), clamp_edge])
     top0, top1, bottom0, bottom1 = (node[of_pairs] for of_pairs in model.bonds.node.reshape(-1, 4).T)
     body = contact[model.free_bodies.body_of_free]
-    return Motion(node, edge, 0.5 * (top0 + top1 - bottom0 - bottom1), body, contact)
+    return EdgeVector(node, edge, 0.5 * (top0 + top1 - bottom0 - bottom1), body, contact)
 
 
-def displacement(model: Model, start: Configuration, end: Configuration) -> Motion:
+def displacement(model: Model, start: Configuration, end: Configuration) -> EdgeVector:
     """Return the motion from one configuration to another; turns, each by less than half a turn, are those beyond
     parallel transport.
     """
@@ -76,7 +64,7 @@ def displacement(model: Model, start: Configuration, end: Configuration) -> Moti
     return compose(model, end.position - start.position, turn[:edges], clamp_edge, contact)
 
 
-def velocity(model: Model, at: Configuration, state: State) -> Motion:
+def velocity(model: Model, at: Configuration, state: State) -> EdgeVector:
     """Return the velocities of a state whose configuration is `at`."""
     world = np.zeros((1, 6))
     contact = np.concatenate([np.hstack([state.body_velocity, state.body_angular_velocity]), world])
@@ -86,7 +74,7 @@ def velocity(model: Model, at: Configuration, state: State) -> Motion:
     return compose(model, state.velocity, state.spin, clamp_edge, contact)
 
 
-def of_prescribed(model: Model, motion: Motion) -> Motion:
+def of_prescribed(model: Model, motion: EdgeVector) -> EdgeVector:
     """Return the part of a motion that prescribed bodies impose on held nodes, clamps' directions, points, surfaces."""
     prescribed = model.free_bodies.free_index < 0
     held = np.zeros(model.node_count, dtype=bool)

@@ -51,7 +51,7 @@ from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.model.state import State, director_rates
 from bilayer_core.model.stimulated_strains import RestStrains
-from bilayer_core.simulation.edge_space import Gradient, Motion, displacement, of_prescribed, velocity
+from bilayer_core.simulation.edge_space import EdgeVector, displacement, gradient_of, of_prescribed, velocity
 from bilayer_core.simulation.momentum import momentum_off_curve
 from bilayer_core.simulation.quadrature import simpson
 
@@ -89,7 +89,7 @@ class _Instant:
     friction: Array
     law_force: Array  # −∂E/∂η of laws [J], shape (n_law,)
     energy: dict[str, float]
-    gradient: dict[str, Gradient]
+    gradient: dict[str, EdgeVector]
     power: dict[str, tuple[float, float]]
 
 
@@ -187,7 +187,7 @@ class EnergyLedger:
         name: str,
         way: _Way,
         rates: list[Array],
-        motions: tuple[Motion, Motion],
+        motions: tuple[EdgeVector, EdgeVector],
         before: _Instant,
         after: _Instant,
     ) -> Array:
@@ -202,7 +202,7 @@ class EnergyLedger:
         energy = max(before.energy[name], after.energy[name])
         return simpson(rate, (0.0, 1.0), tuple(rates), BARRIER_ERROR * energy, BARRIER_HALVINGS)
 
-    def _work_of_fluid(self, before: _Instant, after: _Instant, imposed: Motion) -> float:
+    def _work_of_fluid(self, before: _Instant, after: _Instant, imposed: EdgeVector) -> float:
         """Return the work [J] of the fluid's inertia, dP/dt − ∂T/∂q, on what prescribed bodies impose."""
         held = self._imposed_mass > 0.0
         pushed = after.fluid.momentum[held] - before.fluid.momentum[held]
@@ -210,10 +210,10 @@ class EnergyLedger:
         work = float(np.vdot(turned, imposed.edge[: self._model.rods.edge_count]))
         return work - 0.5 * float(np.vdot(pushed, before.velocity[held] + after.velocity[held]))
 
-    def _force(self, name: str, at: Configuration) -> tuple[float, Gradient]:
+    def _force(self, name: str, at: Configuration) -> tuple[float, EdgeVector]:
         """Return the energy [J] and derivatives of one force at a configuration."""
         energy = self._evaluator.forces(at, (name,))[name]
-        return energy, Gradient.copy_of(self._evaluator.sums, self._model)
+        return energy, gradient_of(self._evaluator.sums, self._model)
 
     def _evaluate_fluid(self, at: Configuration, state: State) -> _Fluid | None:
         fluid = self._evaluator.problem.fluid
@@ -264,7 +264,7 @@ class EnergyLedger:
 class _Way:
     """The straight way from an instant to a state: positions along lines, turns at constant rates."""
 
-    def __init__(self, model: Model, evaluator: Evaluator, begin: _Instant, end: State, moved: Motion):
+    def __init__(self, model: Model, evaluator: Evaluator, begin: _Instant, end: State, moved: EdgeVector):
         self._model, self._evaluator, self._begin, self._moved = model, evaluator, begin.at, moved
         self.state = end.copy()
 
