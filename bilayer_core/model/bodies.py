@@ -37,16 +37,13 @@ def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = Non
     moments = np.array([_second_moment(scene.bodies[i], shapes[i], held[i]) for i in free]).reshape(len(free), 3, 3)
     mass = np.array([scene.bodies[index].motion.mass for index in free], dtype=float)
     freedom = np.concatenate(allowed, axis=1) if free else np.zeros((0, 0))
-    schedules = [b.motion if isinstance(b.motion, Prescribed) else Prescribed(type="prescribed") for b in scene.bodies]
+    prescribed = ((index, body.motion) for index, body in enumerate(scene.bodies) if index not in free)
     placed = PlacedBodies(
         names=tuple(body.name for body in scene.bodies),
         start_position=np.array([body.position for body in scene.bodies], dtype=float).reshape(count, 3),
         start_rotation=np.array([rotation_matrix(np.array(b.rotation)) for b in scene.bodies]).reshape(count, 3, 3),
         shapes=shapes,
-        controlled=np.array([i for i, motion in enumerate(schedules) if motion.controlled], dtype=np.int64),
-        times=tuple(np.array(motion.times, dtype=float) for motion in schedules),
-        displacements=tuple(np.array(motion.displacements, dtype=float).reshape(-1, 3) for motion in schedules),
-        rotations=tuple(np.array(motion.rotations, dtype=float).reshape(-1, 3) for motion in schedules),
+        controlled=np.array([index for index, motion in prescribed if motion.controlled], dtype=np.int64),
     )
     return placed, Bodies(
         free_index=free_index,

@@ -37,18 +37,13 @@ Array = np.ndarray
 
 @dataclass(frozen=True)
 class PlacedBodies(ReadOnlyArrays):
-    """Rigid bodies in the scene's order: where they start, and the schedules of prescribed ones. Their numbers and
-    inertia are in `records.parts.Bodies`.
-    """
+    """Rigid bodies in the scene's order: where they start. Their numbers and inertia are in `records.parts.Bodies`."""
 
     names: tuple[str, ...]
     start_position: Array  # [m], shape (n_body, 3)
     start_rotation: Array  # shape (n_body, 3, 3)
     shapes: tuple[Shape | None, ...]  # surface of each body
     controlled: Array  # prescribed bodies that controllers may move, shape (n_controlled,)
-    times: tuple[Array, ...]  # keyframes of each prescribed body [s]
-    displacements: tuple[Array, ...]  # and its displacements there [m], shape (n_keyframe, 3)
-    rotations: tuple[Array, ...]  # and its rotation vectors [rad], shape (n_keyframe, 3)
 
 
 @dataclass(frozen=True)

@@ -145,9 +145,10 @@ def paths_of(model: Model, pose_goal: Array) -> Paths:
             reached, turned, velocity, spin = (np.array([np.zeros(3), goal[part]]) for part in steps)
             columns.append((ends, reached, turned, velocity[::-1], spin[::-1]))
             continue
-        times = bodies.times[b] if len(bodies.times[b]) else np.zeros(1)
+        motion = scene[b].motion
+        times = np.array(motion.times or [0.0], dtype=float)
         rest = np.zeros((len(times), 3))
-        keyframes = (of[b] if len(of[b]) else rest for of in (bodies.displacements, bodies.rotations))
+        keyframes = (np.array(of if of else rest, dtype=float) for of in (motion.displacements, motion.rotations))
         columns.append((times, *keyframes, rest, rest))
     time, displacement, rotation_vector, velocity, rotation_rate = map(np.concatenate, zip(*columns, strict=True))
     return Paths(

@@ -40,15 +40,16 @@ def between_keyframes(times, values, time):
     return value + s * s * (3.0 - 2.0 * s) * way, 6.0 * s * (1.0 - s) / duration * way
 
 
-def scheduled_motion(bodies, index, time):
+def scheduled_motion(model, index, time):
     """Position [m], shape (3,), and rotation of a prescribed body, shape (3, 3), with velocity and angular velocity
     [m/s, rad/s], shape (6,).
     """
-    times, rates = bodies.times[index], np.zeros(6)
-    moved, rates[:3] = between_keyframes(times, bodies.displacements[index], time)
+    bodies, motion, rates = model.bodies, model.scene.bodies[index].motion, np.zeros(6)
+    times, displacements, rotations = map(np.array, (motion.times, motion.displacements, motion.rotations))
+    moved, rates[:3] = between_keyframes(times, displacements, time)
     position = bodies.start_position[index] + moved
-    if not len(bodies.rotations[index]):
+    if not len(rotations):
         return position, bodies.start_rotation[index], rates
-    turn, rate = between_keyframes(times, bodies.rotations[index], time)
+    turn, rate = between_keyframes(times, rotations, time)
     rates[3:] = angular_velocity(turn, rate)
     return position, rotation_matrix(turn) @ bodies.start_rotation[index], rates

@@ -167,7 +167,7 @@ def test_a_body_on_a_path_is_where_the_path_leads_with_its_rates():
     while simulator.time < 0.1:
         simulator.step(until=0.1)
         state = simulator._state
-        position, rotation, rates = scheduled_motion(simulator.model.bodies, 0, simulator.time)
+        position, rotation, rates = scheduled_motion(simulator.model, 0, simulator.time)
         np.testing.assert_allclose(state.body_position[0], position, atol=1e-15)
         np.testing.assert_allclose(state.body_rotation[0], rotation, atol=1e-14)
         np.testing.assert_allclose(state.body_velocity[0], rates[:3], atol=1e-12)
