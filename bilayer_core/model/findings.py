@@ -5,38 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 ALIKE = 1e-9
 """Relative difference of severities that does not make one worse than another."""
-
-
-class Told(Protocol):
-    """Something that is said of a place in a scene."""
-
-    @property
-    def where(self) -> str:
-        """Place."""
-        ...
-
-    @property
-    def kind(self) -> Hashable:
-        """Things of one kind are told as one."""
-        ...
-
-    @property
-    def severity(self) -> float:
-        """More for what is worse."""
-        ...
-
-    @property
-    def superlative(self) -> str:
-        """Word for the one with the largest severity among several."""
-        ...
-
-    def line(self, where: str) -> str:
-        """Return the message about a place, in which the text `where` names the place."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -55,15 +26,57 @@ class Finding:
         return f"{self.before}{where}{self.after}"
 
 
-def told(found: Iterable[Told]) -> tuple[str, ...]:
+@dataclass(frozen=True)
+class Figure:
+    """A figure of a scene on which the validity of the model depends.
+
+    Attributes
+    ----------
+    where : str
+        Key path.
+    what, value, limit : str
+        The quantity, its value with the unit, and the range in which the model is meant to be used.
+    severity : float
+        A number to compare figures of one quantity by: 1 at the limit, more beyond.
+    outside : str
+        What it means that the value is out of the range; empty while it is within.
+    """
+
+    where: str
+    what: str
+    value: str
+    limit: str
+    severity: float
+    outside: str = ""
+
+    @property
+    def kind(self) -> tuple[str, bool]:
+        """The quantity, and whether it is out of its range."""
+        return self.what, bool(self.outside)
+
+    @property
+    def superlative(self) -> str:
+        """Phrase that describes this figure when it has the largest severity among several."""
+        return "worst" if self.outside else "nearest to the limit"
+
+    def line(self, where: str) -> str:
+        """Return the figure, with the text that names the place."""
+        text = f"{where}: {self.what} {self.value} ({self.limit})"
+        return f"{text}: {self.outside}" if self.outside else text
+
+    def __str__(self) -> str:
+        return self.line(self.where)
+
+
+def told(found: Iterable[Finding | Figure]) -> tuple[str, ...]:
     """Return a line for each kind, in the order in which the kinds occur first."""
-    kinds: dict[Hashable, list[Told]] = {}
+    kinds: dict[Hashable, list[Finding | Figure]] = {}
     for one in found:
         kinds.setdefault(one.kind, []).append(one)
     return tuple(_line(of_kind) for of_kind in kinds.values())
 
 
-def _line(found: list[Told]) -> str:
+def _line(found: list[Finding | Figure]) -> str:
     worst = max(found, key=lambda one: one.severity)
     others = list(dict.fromkeys(one.where for one in found if one.where != worst.where))
     if not others:

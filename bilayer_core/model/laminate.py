@@ -8,6 +8,7 @@ from itertools import groupby
 
 import numpy as np
 
+from bilayer_core.model.findings import Figure
 from bilayer_core.model.immersed import add_fluid
 from bilayer_core.model.laminate_section import (
     Cells,
@@ -32,7 +33,6 @@ from bilayer_core.model.strands import (
     strand_shape,
     with_copies,
 )
-from bilayer_core.model.validity import Figure
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.pattern import stacked
 from bilayer_core.scene.profile import values_at

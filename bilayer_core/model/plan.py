@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from bilayer_core.errors import SceneError
 from bilayer_core.model.colliders import ContactPair, contact_pairs, is_ribbon
 from bilayer_core.model.dragged_bodies import dry_bodies
-from bilayer_core.model.findings import few, told
+from bilayer_core.model.findings import Figure, few, told
 from bilayer_core.model.force_list import planned
 from bilayer_core.model.free_motions import mechanisms_of
 from bilayer_core.model.imperfect_shapes import advice
@@ -19,7 +19,7 @@ from bilayer_core.model.redundancy import redundant_joints, require_possible_mot
 from bilayer_core.model.rod_pairs import RodPair, passing_warnings, rod_pairs
 from bilayer_core.model.rods import snapped_layers
 from bilayer_core.model.twisted import HELIX, helix_error, twist_figures
-from bilayer_core.model.validity import Figure, validity_warnings
+from bilayer_core.model.validity import validity_warnings
 from bilayer_core.scene.config import Coupling, SceneConfig
 from bilayer_core.scene.rod import Rod
 

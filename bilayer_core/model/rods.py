@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bilayer_core.kinematics.frame_strains import rest_strains
+from bilayer_core.model.findings import Figure
 from bilayer_core.model.immersed import add_fluid
 from bilayer_core.model.lit_elements import add_lit_elements, is_light
 from bilayer_core.model.section import Section, bond, outline, sections
@@ -22,7 +23,6 @@ from bilayer_core.model.strands import (
     strand_shape,
     with_copies,
 )
-from bilayer_core.model.validity import Figure
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.profile import means_between

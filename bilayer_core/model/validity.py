@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
+from bilayer_core.model.findings import Figure
 from bilayer_core.model.plate_strip import curved_stiffness, folds, swollen_curvature
 from bilayer_core.model.points_between import demand_of, spacing
 from bilayer_core.model.section import outline
@@ -24,48 +24,6 @@ SHEAR = 0.01  # of the deflection under a load across
 FAR = 0.5  # barrier distance over thickness
 COARSE = 2.0  # edge length over thickness and barrier distance, where something went through an edge
 GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(3)  # exact for the squares of parabolas
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A figure of a scene on which the validity of the model depends.
-
-    Attributes
-    ----------
-    where : str
-        Key path.
-    what, value, limit : str
-        The quantity, its value with the unit, and the range in which the model is meant to be used.
-    severity : float
-        A number to compare figures of one quantity by: 1 at the limit, more beyond.
-    outside : str
-        What it means that the value is out of the range; empty while it is within.
-    """
-
-    where: str
-    what: str
-    value: str
-    limit: str
-    severity: float
-    outside: str = ""
-
-    @property
-    def kind(self) -> tuple[str, bool]:
-        """The quantity, and whether it is out of its range."""
-        return self.what, bool(self.outside)
-
-    @property
-    def superlative(self) -> str:
-        """Phrase that describes this figure when it has the largest severity among several."""
-        return "worst" if self.outside else "nearest to the limit"
-
-    def line(self, where: str) -> str:
-        """Return the figure, with the text that names the place."""
-        text = f"{where}: {self.what} {self.value} ({self.limit})"
-        return f"{text}: {self.outside}" if self.outside else text
-
-    def __str__(self) -> str:
-        return self.line(self.where)
 
 
 def validity_warnings(scene: SceneConfig) -> Iterator[Figure]:
