@@ -28,9 +28,13 @@ def stiffness_that_holds(energy_per_length: float, distance: float) -> float:
     """Return K_c [Pa] of a barrier of a distance d̂ [m] that takes up so much [J/m] down to d̂/10, to a digit, rounded
     up.
     """
-    needed = max(energy_per_length / barrier.py_func(HELD * distance, distance), sys.float_info.min)
-    digit = 10.0 ** math.floor(math.log10(needed))
-    return math.ceil(needed / digit) * digit
+    return rounded_up(max(energy_per_length / barrier.py_func(HELD * distance, distance), sys.float_info.min))
+
+
+def rounded_up(value: float) -> float:
+    """Return the next number from a positive one up that has one digit."""
+    digit = 10.0 ** math.floor(math.log10(value))
+    return math.ceil(value / digit) * digit
 
 
 def heaviest(model: Model) -> float:

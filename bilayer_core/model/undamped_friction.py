@@ -8,15 +8,14 @@ so its figures have no limit in the step, and the user is told.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from bilayer_core.scene.config import SceneConfig
 
 
 def unseen_vibrations(scene: SceneConfig) -> tuple[str, ...]:
     """Return what all runs in steps of about the same length may miss, each with a remedy; none where nothing rubs."""
     law = scene.contact.friction if scene.contact is not None else None
-    undamped = [name for name in _materials_of_rods(scene) if scene.materials[name].retardation_time == 0.0]
+    used = dict.fromkeys(layer.material for rod in scene.rods for layer in rod.layers)
+    undamped = [name for name in used if scene.materials[name].retardation_time == 0.0]
     if law is None or not law.acts or not undamped:
         return ()
     keys = ", ".join(f"materials.{name}.retardation_time" for name in undamped)
@@ -24,7 +23,3 @@ def unseen_vibrations(scene: SceneConfig) -> tuple[str, ...]:
         "vibrations that friction excites, which no material damps: steps that resolve them may change strides by 10 % "
         f"or more. {keys} damps them; `bilayer run --error-estimate --quarter-step` tells by how much steps matter",
     )
-
-
-def _materials_of_rods(scene: SceneConfig) -> Iterable[str]:
-    return dict.fromkeys(layer.material for rod in scene.rods for layer in rod.layers)

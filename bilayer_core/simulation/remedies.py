@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from bilayer_core.contact.barrier import barrier
@@ -11,7 +9,7 @@ from bilayer_core.engine.newton import LAST_DIGITS
 from bilayer_core.engine.step_outcome import IntegrationReport
 from bilayer_core.errors import Remedy
 from bilayer_core.integrators.method import Method
-from bilayer_core.model.impacts import HELD, heaviest, stiffness_that_holds
+from bilayer_core.model.impacts import HELD, heaviest, rounded_up, stiffness_that_holds
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.status import (
     BEYOND,
@@ -86,19 +84,19 @@ def remedy(
         return _with_adaptive_steps(_stiffer(model, speed), steps, method)
     stuck = found.status in (MAX_ITERATIONS, LINE_SEARCH)
     if stuck and solver.newton_tolerance is None and found.residual <= NEARLY * steps.newton_tolerance:
-        return _set("solver.newton_tolerance", f"{_rounded_up(MARGIN * found.residual):.1g}", "m/s")
+        return _set("solver.newton_tolerance", f"{rounded_up(MARGIN * found.residual):.1g}", "m/s")
     if not steps.adaptive:
         return _adaptive(steps, method)
     if touches:
         return _stiffer(model, speed)
     if found.status == TOO_INACCURATE:
-        needed = _rounded_up(MARGIN * found.error * steps.tolerance)
+        needed = rounded_up(MARGIN * found.error * steps.tolerance)
         if needed <= LARGEST_TOLERANCE:
             return _set("solver.tolerance", f"{needed:.1g}")
         return Remedy("let what acts on the robot grow over a time instead of at once")
     friction = scene.contact.friction if scene.contact is not None else None
     if friction is not None and friction.speed_threshold < MUCH_FASTER * steps.newton_tolerance:
-        needed = _rounded_up(MUCH_FASTER * steps.newton_tolerance)
+        needed = rounded_up(MUCH_FASTER * steps.newton_tolerance)
         return _set("contact.friction.speed_threshold", f"{needed:.1g}", "m/s")
     if stuck and solver.newton_tolerance is not None:
         return _without("solver.newton_tolerance")
@@ -146,9 +144,3 @@ def _stiffness_that_holds(model: Model, speed: float) -> float:
     contact = model.scene.contact
     needed = stiffness_that_holds(0.5 * heaviest(model) * speed**2, contact.barrier_distance)
     return max(needed, MUCH_FASTER * model.contact_stiffness)
-
-
-def _rounded_up(value: float) -> float:
-    """Round up to one digit."""
-    digit = 10.0 ** math.floor(math.log10(value))
-    return math.ceil(value / digit) * digit
