@@ -128,8 +128,8 @@ class GapCheck:
         before, self._before = self._before, at
         if before is None:
             return ""
-        turns = zip(before.surface_rotation, at.surface_rotation, strict=True)
-        if max((_angle(one.T @ other) for one, other in turns), default=0.0) > LARGEST_TURN:
+        turns = before.surface_rotation.transpose(0, 2, 1) @ at.surface_rotation
+        if len(turns) and Rotation.from_matrix(turns).magnitude().max() > LARGEST_TURN:
             return ""
         moved = at.sections - before.sections
         rods = _parts(_largest(moved[0]) + _largest(moved[1]), self._smallest_radius) if self._pairs else 0
@@ -201,10 +201,6 @@ def _parts(way: float, size: float) -> int:
 
 def _largest(way: Array) -> float:
     return float(np.linalg.norm(way, axis=1).max()) if len(way) else 0.0
-
-
-def _angle(rotation: Array) -> float:
-    return math.acos(min(max(0.5 * (float(np.trace(rotation)) - 1.0), -1.0), 1.0))
 
 
 class PairsOfEdges:

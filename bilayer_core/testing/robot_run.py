@@ -52,7 +52,7 @@ class RobotRun:
         try:
             self.result = self._run(judged=True)
             if self.verdict is None:
-                self._judge_all()
+                self._judged(lambda: self._judge.end(inside=True))
         finally:
             detach()
         self.data: RunData = recorder.run_data()
@@ -79,7 +79,7 @@ class RobotRun:
     def _run(self, judged: bool) -> RunResult:
         def each(time: float) -> None:
             if judged:
-                self._look(time)
+                self._judged(lambda: self._judge.look(time))
             if self._drive is not None:
                 self._drive(self.simulator)
 
@@ -87,15 +87,9 @@ class RobotRun:
             self._drive(self.simulator)
         return self.simulator.run(until=self._until, stop=lambda: self.verdict is not None, each_step=each)
 
-    def _look(self, time: float) -> None:
+    def _judged(self, judge: Callable[[], object]) -> None:
         try:
-            self._judge.look(time)
-        except Verdict as verdict:
-            self.verdict = verdict
-
-    def _judge_all(self) -> None:
-        try:
-            self._judge.end(inside=True)
+            judge()
         except Verdict as verdict:
             self.verdict = verdict
 
