@@ -94,11 +94,6 @@ def measure(results: Results, quick: bool, progress: Callable[[str], None] = lam
     return skipped
 
 
-def count(quick: bool) -> int:
-    """Return how many times `measure` calls its progress."""
-    return len(PEERS)
-
-
 def _identity(peer: Peer, case: Case) -> dict:
     return {"tool": peer.name, **asdict(case)}
 

@@ -45,7 +45,7 @@ def chosen_problems(chosen: Sequence[str]) -> list[Problem]:
 def count(chosen: Sequence[str], quick: bool) -> int:
     """Return how many times `measure` calls its progress."""
     total = len(work_precision.plan(chosen_problems(chosen), quick))
-    total += cantilever.count(quick) * (PEERS in chosen)
+    total += len(cantilever.PEERS) * (PEERS in chosen)
     total += len(scaling.plan(quick)) * (SCALING in chosen)
     return total + len(start.plan(quick)) * (START in chosen)
 

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from bilayer_core.log.file.output_paths import draft_of
+from bilayer_core.log.file.output_paths import write_text
 from bilayer_core.model.plan import RECOMMENDED, make_plan
 from bilayer_core.verification.bench import cantilever, pareto, scaling, start, work_precision
 from bilayer_core.verification.bench.configurations import Family
 from bilayer_core.verification.bench.converged_answers import read_file, sharp
 from bilayer_core.verification.bench.problems import PROBLEMS
+from bilayer_core.verification.bench.results import PARTS
+from bilayer_core.verification.csv_files import write_rows
 
 NONE = "–"
 
@@ -21,39 +22,34 @@ NONE = "–"
 def write_csv(content: dict, directory: Path) -> list[Path]:
     """Write a table DIR/<part>.csv for each part that has records, one line for each record."""
     paths = []
-    for part in (work_precision.PART, cantilever.PART, scaling.PART, start.PART):
-        records = [_flat(record) for record in content[part]]
-        if records:
+    for part in PARTS:
+        if content[part]:
             paths.append(directory / f"{part}.csv")
-            columns = list(dict.fromkeys(key for record in records for key in record))
-            _write(paths[-1], lambda file, c=columns, r=records: _rows(file, c, r))
+            write_rows(paths[-1], [_flat(record) for record in content[part]])
     return paths
 
 
 def write_page(content: dict, directory: Path) -> Path:
     """Write DIR/bench.md; returns its path."""
     path = directory / "bench.md"
-    _write(path, lambda file: file.write(page(content)))
+    write_text(path, page(content), force=True)
     return path
 
 
 def page(content: dict) -> str:
     """Return all tables in Markdown, those for the README among them."""
+    compared, peers = bool(content[work_precision.PART]), bool(content[cantilever.PART])
     parts = [
         _where(content),
         *(["Quick: reduced problems, few points.", ""] if content["quick"] else []),
-        *_section("Common cantilever", cantilever_table(content), cantilever.PART in _filled(content)),
-        *_section("CPU time to an error of 1 %", costs_table(content), work_precision.PART in _filled(content)),
-        *_section("Adaptive steps beside implicit Euler", beside_table(content), bool(content[work_precision.PART])),
-        *_section("References", references_table(content), work_precision.PART in _filled(content)),
+        *_section("Common cantilever", cantilever_table(content), peers),
+        *_section("CPU time to an error of 1 %", costs_table(content), compared),
+        *_section("Adaptive steps beside implicit Euler", beside_table(content), compared),
+        *_section("References", references_table(content), compared),
         *_section("CPU time of a step against nodes", scaling_table(content), bool(content[scaling.PART])),
         *_section("First step of a new process", start_table(content), bool(content[start.PART])),
     ]
     return "\n".join(parts) + "\n"
-
-
-def _filled(content: dict) -> set[str]:
-    return {part for part in (work_precision.PART, cantilever.PART, scaling.PART, start.PART) if content[part]}
 
 
 def _section(title: str, table: list[str], wanted: bool) -> list[str]:
@@ -217,17 +213,6 @@ def _flat(record: dict, prefix: str = "") -> dict:
     for key, value in record.items():
         found |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
     return found
-
-
-def _rows(file, columns: list[str], records: list[dict]) -> None:
-    table = csv.DictWriter(file, columns)
-    table.writeheader()
-    table.writerows(records)
-
-
-def _write(path: Path, fill: Callable) -> None:
-    with draft_of(path, force=True) as draft, draft.open("w", newline="", encoding="utf-8") as file:
-        fill(file)
 
 
 def recommendation(content: dict) -> Family | None:

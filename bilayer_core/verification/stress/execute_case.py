@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from bilayer_core.errors import BilayerError, Remedy, SimulationError
 from bilayer_core.observed.frame import Frame
 from bilayer_core.scene.config import DEFAULT_TOLERANCE
-from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.testing.judge import Verdict
 from bilayer_core.testing.trial import Trial, distance_of
 from bilayer_core.verification.stress.robots import LOOKS
@@ -60,7 +59,7 @@ def _run(case: StressCase, record: Record, overrides: Sequence[str] = ()) -> tup
         return trial, decision
     finally:
         record.figures |= _figures(trial)
-        record.warnings = _warnings(trial.simulator)
+        record.warnings = list(trial.simulator.summary()["warnings"])
 
 
 def _trial_of(case: StressCase, overrides: Sequence[str] = (), effort: float = 1.0, judged: bool = True) -> Trial:
@@ -103,10 +102,6 @@ def _figures(trial: Trial) -> dict[str, float | int | None]:
 
 def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
-
-
-def _warnings(simulator: Simulator) -> list[str]:
-    return list(simulator.summary()["warnings"])
 
 
 def _decide(case: StressCase, record: Record, trial: Trial, decision: Decision | None) -> None:

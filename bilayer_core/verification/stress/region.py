@@ -80,7 +80,7 @@ def impact_speed(p: Parameters) -> float:
     """Return the speed of the part that hits a surface or a strip [m/s]."""
     if p.robot in ("drop", "pile"):
         return math.sqrt(2.0 * robots.gravity(p) * (robots.height(p) + robots.barrier(p)))
-    return robots.speed(p)
+    return p.speed
 
 
 def _of_contact(p: Parameters) -> Iterator[str]:

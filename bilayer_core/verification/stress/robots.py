@@ -82,10 +82,10 @@ def period(p: Parameters) -> float:
 
 def duration(p: Parameters) -> float:
     """Return the duration of the run [s]."""
-    fastest = max(speed(p), math.sqrt(0.2 * p.length * gravity(p)) if p.robot == "ball" else 0.0)
+    fastest = max(p.speed, math.sqrt(0.2 * p.length * gravity(p)) if p.robot == "ball" else 0.0)
     flight = {"ball": 1.2, "bat": 1.2, "box": 12.0}.get(p.robot, 0.0) * p.length / fastest
     if p.robot in ("drop", "pile") and p.gravity > 0.0:
-        flight = 1.5 * speed(p) / gravity(p)
+        flight = 1.5 * p.speed / gravity(p)
     return float(f"{max(flight, 0.0) + (PERIODS * period(p) if p.robot not in ('ball', 'box') else 0.0):.3g}")
 
 
@@ -94,16 +94,11 @@ def gravity(p: Parameters) -> float:
     return p.gravity * USUAL_LENGTH / p.length
 
 
-def speed(p: Parameters) -> float:
-    """Return a speed [m/s], of the same Froude number at any length."""
-    return p.speed
-
-
 def height(p: Parameters) -> float:
     """Return the height from which what falls has the speed at the ground [m]."""
     if p.gravity == 0.0:
         return 0.01 * p.length
-    return min(speed(p) ** 2 / (2.0 * gravity(p)), HIGHEST * p.length / USUAL_LENGTH)
+    return min(p.speed**2 / (2.0 * gravity(p)), HIGHEST * p.length / USUAL_LENGTH)
 
 
 def barrier(p: Parameters) -> float:
@@ -264,7 +259,7 @@ def _ball(p: Parameters, content: dict) -> None:
 
 
 def _free_ball(p: Parameters, position, direction) -> dict:
-    velocity = speed(p) * np.array(direction) / np.linalg.norm(direction)
+    velocity = p.speed * np.array(direction) / np.linalg.norm(direction)
     return {
         "name": "ball",
         "position": [float(x) for x in position],
@@ -276,7 +271,7 @@ def _free_ball(p: Parameters, position, direction) -> dict:
 def _bat(p: Parameters, content: dict) -> None:
     radius, way = _ball_radius(p), 0.6 * p.length
     gap = radius + _below(p) + 3.0 * barrier(p)
-    time = 1.5 * way / speed(p)  # the cubic smoothstep is fastest half way, by 1.5
+    time = 1.5 * way / p.speed  # the cubic smoothstep is fastest half way, by 1.5
     there = (-gap - 0.2 * p.length, 0.0, -0.7 * p.length)
     bat = _held("bat", there, times=[0.0, time], displacements=[[0.0] * 3, [way, 0.0, 0.0]])
     content["bodies"] = [_held("hook"), bat | {"surface": {"shape": "sphere", "radius": radius}}]

@@ -66,14 +66,11 @@ def _with(case: StressCase, parameters: Parameters, **changes: bool) -> StressCa
 def write_scene(case: StressCase, record: Record, directory: Path, before: str = "") -> Path:
     """Write the scene of a case with what came of it, as a file that runs again."""
     directory.mkdir(parents=True, exist_ok=True)
-    path = directory / f"{before}{_file_name(case.name)}.yaml"
+    name = "".join(character if character.isalnum() or character in "-._" else "_" for character in case.name)
+    path = directory / f"{before}{name}.yaml"
     notes = [case.name, f"{record.outcome}: {record.reason}".rstrip(": "), *record.outside]
     notes += [f"remedy: {record.remedy}"] if record.remedy else []
     head = "".join(f"# {line}\n" for note in notes for line in note.splitlines())
     head += f"# bilayer stress --scene {path.name}\n"
     write_text(path, head + yaml.safe_dump(case.content(), sort_keys=False), force=True)
     return path
-
-
-def _file_name(name: str) -> str:
-    return "".join(character if character.isalnum() or character in "-._" else "_" for character in name)

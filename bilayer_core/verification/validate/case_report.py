@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 
-from bilayer_core.log.file.output_paths import draft_of, write_text
+from bilayer_core.log.file.output_paths import write_text
+from bilayer_core.verification.csv_files import write_rows
 from bilayer_core.verification.validate.validation_case import Result
 
 NOTHING = 1e-8
@@ -27,10 +27,7 @@ def write_json(results: Sequence[Result], path: Path) -> None:
 
 def write_csv(results: Sequence[Result], path: Path) -> None:
     """Write the results as csv, a line each."""
-    with draft_of(path, force=True) as draft, draft.open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, list(results[0].record()))
-        table.writeheader()
-        table.writerows(result.record() for result in results)
+    write_rows(path, [result.record() for result in results])
 
 
 def write_page(results: Sequence[Result], path: Path) -> None:
