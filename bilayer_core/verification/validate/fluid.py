@@ -125,7 +125,7 @@ def strip_across_a_flow(speed: float, added: bool) -> float:
     """
     stretching, bending = SOFT * WIDTH * SOFT_THICKNESS, SOFT * WIDTH * SOFT_THICKNESS**3 / 12.0
     half, mass = 0.5 * DENSITY * WIDTH, added * ADDED["through"]
-    solved = None
+    mesh, shape, status = np.linspace(0.0, SOFT_LENGTH, 400), np.zeros((5, 400)), 0
     for flow in (*(part for part in (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.7) if part < speed), speed):
 
         def slopes(_: np.ndarray, y: np.ndarray, flow: float = flow) -> np.ndarray:
@@ -140,13 +140,11 @@ def strip_across_a_flow(speed: float, added: bool) -> float:
         def ends(start: np.ndarray, end: np.ndarray) -> np.ndarray:
             return np.array([start[0], start[1], end[2], end[3], end[4]])
 
-        mesh, guess = (
-            (np.linspace(0.0, SOFT_LENGTH, 400), np.zeros((5, 400))) if solved is None else (solved.x, solved.y)
-        )
-        solved = solve_bvp(slopes, ends, mesh, guess, tol=1e-5, max_nodes=50_000)
-    if solved is None or solved.status != 0:
+        found = solve_bvp(slopes, ends, mesh, shape, tol=1e-5, max_nodes=50_000)
+        mesh, shape, status = found.x, found.y, max(status, found.status)
+    if status > 0:
         raise ArithmeticError("the elastica in a flow was not found")
-    return float(solved.y[0, -1])
+    return float(shape[0, -1])
 
 
 CASES = [
