@@ -8,14 +8,15 @@ Neighbours on the same strand are always near each other, but do not meet where 
 every edge e between them keeps e·d ≥ c times its arc length for some unit vector d, then two places L apart on the path
 are c L apart at least (Volino & Magnenat-Thalmann 1994). So the search leaves out the *run* of such edges about those
 for which it is made, with c L their distance for the smallest L at which a rod sees itself. As e·d is linear in a
-straight motion, it is enough to look at both ends of that.
+straight motion, it is enough to look at both ends of that. Of ribbons this holds for the rails of either border; two
+places on different ones are nearer to each other by no more than what lies across, along d.
 """
 
 from __future__ import annotations
 
 import math
 
-from bilayer_core.contact.segment import square_distance
+from bilayer_core.contact.facet import INSIDE, SLACK, square_between
 from bilayer_core.jit import kernel, piece, record
 from bilayer_core.jit.record import Flags, FlagTable, IndexTable, Indices, Matrix, Vector
 
@@ -27,10 +28,11 @@ class RodSearch:
     The size ``"tree"`` is that of the tree, ``"near pair"`` the capacity for pairs.
     """
 
-    start_position: Matrix  # of nodes at the start of the run [m], shape (n_node, 3)
-    base: Matrix = ("node", 3)  # where a straight motion of nodes begins [m]
-    tip: Matrix = ("node", 3)  # and ends
+    start_position: Matrix  # of rails at the start of the run [m], shape (n_rail, 3)
+    base: Matrix = ("rail", 3)  # where a straight motion of rails begins [m]
+    tip: Matrix = ("rail", 3)  # and ends
     edge_node: Indices  # first node of each edge, shape (n_edge,)
+    edge_right: Indices  # rail of the right border there, −1 of round rods, shape (n_edge,)
     edge_radius: Vector  # largest radius of its strand's nodes [m], shape (n_edge,)
     edge_rod: Indices  # expanded rod of each edge, shape (n_edge,)
     edge_first: Flags  # whether the edge is the first of its strand in memory, shape (n_edge,)
@@ -40,7 +42,9 @@ class RodSearch:
     first_point: Indices  # points of edge k are first_point[k] … first_point[k + 1] − 1, shape (n_edge + 1,)
     point_edge: Indices  # shape (n_point,)
     point_fraction: Vector  # position on its edge, 0 … 1, shape (n_point,)
+    point_across: Vector  # and across it, from the left border to the right, likewise
     point_arc: Vector  # along the path of its rod [m], shape (n_point,)
+    point_sees: Indices  # what it sees of ribbons, see `contact.facet`, shape (n_point,)
     rod_can_collide: FlagTable  # whether two rods, or one and itself, can meet, shape (n_rod, n_rod)
     rod_joined: FlagTable  # whether one body holds both, or both ends of one, shape (n_rod, n_rod)
     rod_exclusion: Vector  # arc distance from which on a rod sees itself [m], shape (n_rod,)
@@ -59,15 +63,6 @@ class RodSearch:
 
 
 @kernel
-def _square_distance(position, i, s, j):
-    """Return the square of the distance of the point at s on edge (i, i+1) from the segment (j, j+1) [m²]."""
-    p0 = (1.0 - s) * position[i, 0] + s * position[i + 1, 0]
-    p1 = (1.0 - s) * position[i, 1] + s * position[i + 1, 1]
-    p2 = (1.0 - s) * position[i, 2] + s * position[i + 1, 2]
-    return square_distance(p0, p1, p2, position, j)
-
-
-@kernel
 def _sees(search, a, p, k, touch):
     """Return whether a point p of edge a may touch segment k of a rod that its own rod can meet.
 
@@ -79,8 +74,9 @@ def _sees(search, a, p, k, touch):
         return False
     if not search.rod_joined[own, other]:
         return True
-    i, j, radii = search.edge_node[a], search.edge_node[k], search.edge_radius[a] + search.edge_radius[k]
-    return _square_distance(search.start_position, i, search.point_fraction[p], j) > (radii + touch) ** 2
+    radii = search.edge_radius[a] + search.edge_radius[k]
+    slack = SLACK if search.edge_right[a] >= 0 or search.edge_right[k] >= 0 else 1.0
+    return square_between(search, search.start_position, p, k) > (radii + touch) ** 2 * slack
 
 
 @kernel
@@ -124,7 +120,22 @@ def _along(position, i, d0, d1, d2):
 def _goes_on(search, k, d0, d1, d2, share):
     """Return whether an edge goes `share` of its arc length or more along a unit vector, at both ends of its motion."""
     i, least = search.edge_node[k], share * (search.edge_arc[k, 1] - search.edge_arc[k, 0])
-    return _along(search.base, i, d0, d1, d2) >= least and _along(search.tip, i, d0, d1, d2) >= least
+    if _along(search.base, i, d0, d1, d2) < least or _along(search.tip, i, d0, d1, d2) < least:
+        return False
+    r = search.edge_right[k]
+    return r < 0 or (_along(search.base, r, d0, d1, d2) >= least and _along(search.tip, r, d0, d1, d2) >= least)
+
+
+@kernel
+def _across(search, k, d0, d1, d2):
+    """Return the largest part along a unit vector of what lies across an edge of a ribbon, in its motion [m]."""
+    i, r, largest = search.edge_node[k], search.edge_right[k], 0.0
+    for end in range(2):
+        for part in range(2):
+            x = search.base if part == 0 else search.tip
+            along = d0 * (x[r + end, 0] - x[i + end, 0]) + d1 * (x[r + end, 1] - x[i + end, 1])
+            largest = max(largest, abs(along + d2 * (x[r + end, 2] - x[i + end, 2])))
+    return largest
 
 
 RUN = 2.0
@@ -139,13 +150,16 @@ def _run_about(search, first, last, near):
     has to check for contact with itself. The run is empty if there is no such one.
     """
     position, tip, edge_first, edge_arc = search.base, search.tip, search.edge_first, search.edge_arc
-    exclusion = search.rod_exclusion[search.edge_rod[first]]
+    exclusion, own_near = search.rod_exclusion[search.edge_rod[first]], near
     i, j = search.edge_node[first], search.edge_node[last] + 1
     d0 = position[j, 0] - position[i, 0] + tip[j, 0] - tip[i, 0]
     d1 = position[j, 1] - position[i, 1] + tip[j, 1] - tip[i, 1]
     d2 = position[j, 2] - position[i, 2] + tip[j, 2] - tip[i, 2]
     scale = 1.0 / math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
     d0, d1, d2 = d0 * scale, d1 * scale, d2 * scale
+    for k in range(first, last + 1):
+        if search.edge_right[k] >= 0:
+            near = max(near, own_near + _across(search, k, d0, d1, d2))
     share = near / exclusion
     for k in range(first, last + 1):
         if (k > first and edge_first[k]) or not _goes_on(search, k, d0, d1, d2, share):
@@ -186,6 +200,47 @@ def _near_leaves(box, leaves, own, distance, begin, end, met_out):
     return count
 
 
+@kernel
+def _sweep_ribbon(search, k, b):
+    """Write the box of an edge of a ribbon over its motion, and the ball about its middle that holds it."""
+    position, tip, box, sweep, radius = search.base, search.tip, search.box, search.sweep, search.edge_radius[k]
+    i, r = search.edge_node[k], search.edge_right[k]
+    for c in range(3):
+        low, high, middle, moved = math.inf, -math.inf, 0.0, 0.0
+        for corner in range(4):
+            n = (i if corner < 2 else r) + corner % 2
+            low, high = min(low, position[n, c], tip[n, c]), max(high, position[n, c], tip[n, c])
+            middle += 0.25 * position[n, c]
+            moved += 0.25 * (tip[n, c] - position[n, c])
+        box[b, c], box[b, 3 + c] = low - radius, high + radius
+        sweep[k, c], sweep[k, 3 + c] = middle, moved
+    size = turn = 0.0
+    for corner in range(4):
+        n, away, moved = (i if corner < 2 else r) + corner % 2, 0.0, 0.0
+        for c in range(3):
+            away += (position[n, c] - sweep[k, c]) ** 2
+            moved += (tip[n, c] - position[n, c] - sweep[k, 3 + c]) ** 2
+        size, turn = max(size, away), max(turn, moved)
+    sweep[k, 6] = math.sqrt(size) + math.sqrt(turn) + radius
+
+
+@kernel
+def _moved_against(search, a, s, v, k):
+    """Return the largest motion of the point (s, v) of an edge a against a corner of an edge k [m]."""
+    position, tip, i, r = search.base, search.tip, search.edge_node[a], search.edge_right[a]
+    j, right, largest = search.edge_node[k], search.edge_right[k], 0.0
+    for corner in range(2 if right < 0 else 4):
+        n, square = (j if corner < 2 else right) + corner % 2, 0.0
+        for c in range(3):
+            way = (1.0 - s) * (tip[i, c] - position[i, c]) + s * (tip[i + 1, c] - position[i + 1, c])
+            if r >= 0:
+                other = (1.0 - s) * (tip[r, c] - position[r, c]) + s * (tip[r + 1, c] - position[r + 1, c])
+                way = (1.0 - v) * way + v * other
+            square += (way - tip[n, c] + position[n, c]) ** 2
+        largest = max(largest, square)
+    return math.sqrt(largest)
+
+
 @piece(int, RodSearch, float, float)
 def near_pairs(search, touch, distance):
     """List points and segments that may come to a gap below `distance` in a straight motion of nodes, ordered by point,
@@ -222,6 +277,8 @@ def near_pairs(search, touch, distance):
             size += (q - p) ** 2
             turn += (v - q - u + p) ** 2
         sweep[k, 6] = 0.5 * (math.sqrt(size) + math.sqrt(turn)) + radius
+        if search.edge_right[k] >= 0:
+            _sweep_ribbon(search, k, leaves + k)
     for b in range(leaves - 1, 0, -1):
         for c in range(3):
             box[b, c] = min(box[2 * b, c], box[2 * b + 1, c])
@@ -259,9 +316,12 @@ def near_pairs(search, touch, distance):
         if count == 0:
             continue
         for p in range(first_point[a], first_point[a + 1]):
-            s = search.point_fraction[p]
+            s, r = search.point_fraction[p], search.edge_right[a]
+            v = search.point_across[p] if r >= 0 else 0.0
             for n in range(count):
                 k = met[1, n]
+                if search.point_sees[p] == INSIDE and search.edge_right[k] < 0:
+                    continue  # which is a border all through
                 j = edge_node[k]
                 radii = edge_radius[a] + edge_radius[k]
                 left, right = 0.0, 0.0
@@ -270,11 +330,13 @@ def near_pairs(search, touch, distance):
                     left += (way - tip[j, c] + position[j, c]) ** 2
                     right += (way - tip[j + 1, c] + position[j + 1, c]) ** 2
                 moved = math.sqrt(max(left, right))
-                square = _square_distance(position, i, s, j)
+                if r >= 0 or search.edge_right[k] >= 0:
+                    moved = _moved_against(search, a, s, v, k)
+                square = square_between(search, position, p, k)
                 if square >= (radii + distance + moved) ** 2:
                     continue
                 away = math.sqrt(square)  # and no less than half of what is left of this and of that at the end
-                if away + math.sqrt(_square_distance(tip, i, s, j)) >= 2.0 * (radii + distance) + moved:
+                if away + math.sqrt(square_between(search, tip, p, k)) >= 2.0 * (radii + distance) + moved:
                     continue
                 if not _sees(search, a, p, k, touch):
                     continue

@@ -1,16 +1,18 @@
 """Where rods meet other rods: along *rails*, in the middle between their faces.
 
 The curve of a rod lies on its neutral axis; where layers differ that is not the middle of its section, which is at the
-height h over it. The rail of a node i is at
+height h over it. A section that is wider than thick reaches to both sides by b = ½ (width − thickness). The rails of a
+node i are at
 
-    y_i = x_i + h_i · mean of m1 over the edges before and after
+    y_i = x_i + mean of A over the edges before and after,   A = h m1 ± b m2
 
-(at an end the one edge), and a rod meets others with the chain of segments between its rails, half its thickness away
-from it: with either face where the face is. Without a height the rails are the nodes.
+(at an end the one edge), and a rod meets others with the bilinear *facets* between its rails, or with the segments
+between them where there is one, half its thickness away from these: with either face where the face is. Without arms
+the rails are the nodes.
 
 **In a step** an edge e with the ends' step δe turns its frame by |ω| ≤ 1.3 |ṫ| + |δθ| (`contact.step_bound`), and |ṫ| ≤
 σ/(1 − α σ) with σ = |δe|/|e| over the part α of the step. So the rail goes no farther than its node by α times its
-*swing*, h |ω|; α is at most 1/(2 σ) of any edge with a height.
+*swing*, |A| |ω|; α is at most 1/(2 σ) of any edge with an arm.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ from __future__ import annotations
 import math
 
 from bilayer_core.jit import kernel
-from bilayer_core.kinematics.vector import cross, dot, row
+from bilayer_core.kinematics.vector import combine, cross, dot, row
 
 LARGEST_SLOPE = 0.5
 """Of α σ."""
@@ -27,11 +29,18 @@ LARGEST_SLOPE = 0.5
 @kernel
 def place_rails(rails, at):
     """Write the positions of rails [m], shape (n_node, 3)."""
-    place, edges, m1 = rails.place, rails.node_edges, at.director1
-    for i in range(place.shape[0]):
-        half = 0.5 * rails.height[i]
+    place, edges, m1, m2 = rails.place, rails.node_edges, at.director1, at.director2
+    for r in range(place.shape[0]):
+        i, up, aside = rails.node[r], 0.5 * rails.arm[r, 0], 0.5 * rails.arm[r, 1]
         for c in range(3):
-            place[i, c] = at.position[i, c] + half * (m1[edges[i, 0], c] + m1[edges[i, 1], c])
+            place[r, c] = at.position[i, c] + up * (m1[edges[i, 0], c] + m1[edges[i, 1], c])
+            place[r, c] += aside * (m2[edges[i, 0], c] + m2[edges[i, 1], c])
+
+
+@kernel
+def has_arm(rails, r):
+    """Return whether a rail is off its node."""
+    return rails.arm[r, 0] != 0.0 or rails.arm[r, 1] != 0.0
 
 
 @kernel
@@ -47,8 +56,8 @@ def _slope(strands, system, at, e):
 def most_of_turn(rails, strands, system, at):
     """Return the largest part of a step over which the bounds of turning hold."""
     steepest = 0.0
-    for i in range(rails.height.shape[0]):
-        if rails.height[i] != 0.0:
+    for i in range(rails.node_edges.shape[0]):
+        if has_arm(rails, i):
             for side in range(2):
                 steepest = max(steepest, _slope(strands, system, at, rails.node_edges[i, side]))
     return LARGEST_SLOPE / steepest if steepest > LARGEST_SLOPE else 1.0
@@ -57,34 +66,36 @@ def most_of_turn(rails, strands, system, at):
 @kernel
 def write_swings(rails, strands, system, at, part):
     """Write the swing of each rail in a part of a step [m]; return the largest."""
-    largest = 0.0
-    for i in range(rails.height.shape[0]):
+    largest, nodes = 0.0, rails.node_edges.shape[0]
+    for i in range(nodes):
         turn = 0.0
-        if rails.height[i] != 0.0:
+        if has_arm(rails, i):
             for side in range(2):
                 e = rails.node_edges[i, side]
                 slope = _slope(strands, system, at, e)
                 turn = max(turn, 1.3 * slope / (1.0 - part * slope) + abs(system.angle_step[e]))
-        rails.swing[i] = abs(rails.height[i]) * turn
+        rails.swing[i] = math.sqrt(rails.arm[i, 0] ** 2 + rails.arm[i, 1] ** 2) * turn
         largest = max(largest, rails.swing[i])
+    for r in range(nodes, rails.node.shape[0]):  # right borders are as far from their nodes as left ones
+        rails.swing[r] = rails.swing[rails.node[r]]
     return largest
 
 
 @kernel
-def rail_in_step(rails, strands, system, at, i, part):
+def rail_in_step(rails, strands, system, at, r, part):
     """Return where a rail is by a part of a step, as a tuple: directors go with the tangents of their edges by parallel
     transport, and turn about them.
     """
-    step = system.node_step
+    step, i = system.node_step, rails.node[r]
     y0 = at.position[i, 0] + part * step[i, 0]
     y1 = at.position[i, 1] + part * step[i, 1]
     y2 = at.position[i, 2] + part * step[i, 2]
-    half = 0.5 * rails.height[i]
-    if half == 0.0:
+    if not has_arm(rails, r):
         return y0, y1, y2
     for side in range(2):
         e = rails.node_edges[i, side]
-        n, t, m, length = strands.edge_node[e], row(at.tangent, e), row(at.director1, e), at.length[e]
+        n, t, length = strands.edge_node[e], row(at.tangent, e), at.length[e]
+        m = combine(0.5 * rails.arm[r, 0], row(at.director1, e), 0.5 * rails.arm[r, 1], row(at.director2, e))
         u0 = length * t[0] + part * (step[n + 1, 0] - step[n, 0])
         u1 = length * t[1] + part * (step[n + 1, 1] - step[n, 1])
         u2 = length * t[2] + part * (step[n + 1, 2] - step[n, 2])
@@ -93,7 +104,7 @@ def rail_in_step(rails, strands, system, at, i, part):
         scale = dot(m, u) / (1.0 + dot(t, u))
         m = m[0] - scale * (t[0] + u[0]), m[1] - scale * (t[1] + u[1]), m[2] - scale * (t[2] + u[2])
         angle = part * system.angle_step[e]
-        cosine, sine, other = half * math.cos(angle), half * math.sin(angle), cross(u, m)
+        cosine, sine, other = math.cos(angle), math.sin(angle), cross(u, m)
         y0 += cosine * m[0] + sine * other[0]
         y1 += cosine * m[1] + sine * other[1]
         y2 += cosine * m[2] + sine * other[2]
@@ -103,7 +114,7 @@ def rail_in_step(rails, strands, system, at, i, part):
 @kernel
 def write_rail_steps(rails, strands, system, at, part):
     """Write the mean rate of rails over a part of a step, in units of the step [m]; `place` is up to date."""
-    for i in range(rails.height.shape[0]):
+    for i in range(rails.node.shape[0]):
         y0, y1, y2 = rail_in_step(rails, strands, system, at, i, part)
         rails.step[i, 0] = (y0 - rails.place[i, 0]) / part
         rails.step[i, 1] = (y1 - rails.place[i, 1]) / part

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import math
 
+from bilayer_core.contact.facet import BORDERS, SLACK, mix, nearest_on_facet, square_between
 from bilayer_core.contact.rails import rail_in_step
 from bilayer_core.contact.rod_list import FIRST, PATH
-from bilayer_core.contact.segment import SLACK
 from bilayer_core.contact.step_bound import KEPT_FRACTION
 from bilayer_core.jit import kernel
 from bilayer_core.kinematics.vector import combine, combine3, dot
@@ -63,14 +63,17 @@ def rod_step_bound(rods, strands, system, at, position, limit, closing):
             right += (own - step[j + 1, m]) ** 2
         speed = math.sqrt(max(left, right))
         if rails.exists:
-            speed += max(rails.swing[i], rails.swing[i + 1]) + max(rails.swing[j], rails.swing[j + 1])
-        square = _square_distance(position, step, 0.0, i, s, j)
+            speed += _swing(rails, search, a) + _swing(rails, search, k)
+        if search.edge_right[a] < 0 and search.edge_right[k] < 0:
+            square = _square_distance(position, step, 0.0, i, s, j)
+        else:
+            square = square_between(search, position, p, k)
         if square > (radii + speed * alpha / (1.0 - KEPT_FRACTION)) ** 2 * SLACK:
             continue  # even head-on
         gone, gap = 0.0, math.sqrt(square) - radii
         keep = KEPT_FRACTION * min(gap, FAR * d_hat)
         near = TOUCH * min(gap, NEAR * d_hat)
-        left_over = gap - keep
+        left_over = max(gap - keep, 0.0)
         part = 0
         while gone < alpha and speed * (alpha - gone) > left_over:
             if part > 0 and (left_over < near or part == MAX_PARTS):
@@ -79,7 +82,7 @@ def rod_step_bound(rods, strands, system, at, position, limit, closing):
             gone += left_over / speed
             if gone < alpha:
                 if rails.exists:
-                    square = _square_distance_of_rails(rails, strands, system, at, gone, i, s, j)
+                    square = _square_of_rails(rails, search, strands, system, at, gone, p, k)
                 else:
                     square = _square_distance(position, step, gone, i, s, j)
                 left_over = math.sqrt(square) - radii - keep
@@ -107,12 +110,39 @@ def _moved(position, step, fraction, i):
 
 
 @kernel
-def _square_distance_of_rails(rails, strands, system, at, fraction, i, s, j):
-    """Return the square of the distance that `_square_distance` returns, between rails instead of segments [m²]."""
-    x0 = rail_in_step(rails, strands, system, at, i, fraction)
-    x1 = rail_in_step(rails, strands, system, at, i + 1, fraction)
-    y0 = rail_in_step(rails, strands, system, at, j, fraction)
-    return _between(x0, x1, s, y0, rail_in_step(rails, strands, system, at, j + 1, fraction))
+def _swing(rails, search, k):
+    """Return the largest swing of a rail of an edge [m]."""
+    j, r, swing = search.edge_node[k], search.edge_right[k], rails.swing
+    largest = max(swing[j], swing[j + 1])
+    return max(largest, swing[r], swing[r + 1]) if r >= 0 else largest
+
+
+@kernel
+def _square_of_rails(rails, search, strands, system, at, part, p, k):
+    """Return the square of the distance of a point from what it sees of an edge by a part of a step, both of rails
+    [m²].
+    """
+    a, s = search.point_edge[p], search.point_fraction[p]
+    i, r = search.edge_node[a], search.edge_right[a]
+    x0 = rail_in_step(rails, strands, system, at, i, part)
+    x1 = rail_in_step(rails, strands, system, at, i + 1, part)
+    x = mix(s, x0, x1)
+    if r >= 0:
+        first = rail_in_step(rails, strands, system, at, r, part)
+        last = rail_in_step(rails, strands, system, at, r + 1, part)
+        x = mix(search.point_across[p], x, mix(s, first, last))
+    j, r = search.edge_node[k], search.edge_right[k]
+    l0 = rail_in_step(rails, strands, system, at, j, part)
+    l1 = rail_in_step(rails, strands, system, at, j + 1, part)
+    if r < 0:
+        return _between(x0, x1, s, l0, l1) if search.edge_right[a] < 0 else _between(x, x, 0.0, l0, l1)
+    r0 = rail_in_step(rails, strands, system, at, r, part)
+    r1 = rail_in_step(rails, strands, system, at, r + 1, part)
+    if search.point_sees[p] == BORDERS:
+        return min(_between(x, x, 0.0, l0, l1), _between(x, x, 0.0, r0, r1))
+    t, v = nearest_on_facet(l0, l1, r0, r1, x)
+    away = combine(1.0, x, -1.0, mix(v, mix(t, l0, l1), mix(t, r0, r1)))
+    return dot(away, away)
 
 
 @kernel

@@ -12,17 +12,40 @@ that of the nodes between two segments is taken off again:
 
 On a straight chain every segment but the nearest has the distance of its node next to p: all cancels but b of the
 nearest distance. Everywhere B ≥ b(nearest distance), because each inner node is no nearer than the segment on its far
-side; so B is a barrier, smooth where the nearest point passes over a node, and independent of the mesh. What is left of
-the sum after cancelling is listed as *contacts* with a *count* of +1 or −1: the segments with 0 < τ < 1, and each node
-with the number of its segments that are nearest there (τ ≤ 0 or τ ≥ 1), less one for an inner node. A node where the
+side; so B is a barrier, smooth where the nearest point passes over a node, and independent of the mesh. What is left
+after cancelling is listed as *contacts* with a *count* of +1 or −1: the segments with 0 < τ < 1, and each node with the
+number of its segments that are nearest there (τ ≤ 0 or τ ≥ 1), less one for an inner node. A node where the
 chain ends, or where the point does not see the segment beyond (`model.rod_surfaces`), is no inner node.
+
+**Ribbons** are chains of facets (`contact.facet`), with the lines across their ends for nodes, and B_facets is smooth
+where the nearest place passes on to a border. Where two faces meet, few points are enough, an edge or a quarter of the
+width apart; where borders cross, points must be as dense as on round rods. So few points at a border and many take part
+in different ways:
+
+    Σ_few Δl (B_facets − B_left − B_right) + Σ_many Δl (B_left + B_right)
+
+Beside a border B_facets is that of the border: the few cancel, and the many are left. Inside, the borders are farther
+away than the facet, B_facets is left of the few, and nothing of the many.
 """
 
 from __future__ import annotations
 
 import math
 
+from bilayer_core.contact.facet import (
+    BORDERS,
+    INSIDE,
+    SLACK,
+    across_at_end,
+    fraction_between,
+    nearest_place,
+    place_of_point,
+    place_on_facet,
+    square_distance,
+)
 from bilayer_core.jit import kernel
+from bilayer_core.jit.called import stack_vector
+from bilayer_core.kinematics.vector import combine, dot, row
 
 
 @kernel
@@ -41,21 +64,6 @@ def distance_at(p0, p1, p2, position, j, t):
     d1 = p1 - (1.0 - t) * position[j, 1] - t * position[j + 1, 1]
     d2 = p2 - (1.0 - t) * position[j, 2] - t * position[j + 1, 2]
     return math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-
-
-@kernel
-def square_distance(p0, p1, p2, position, j):
-    """Return the square of the distance of a point from the segment (j, j+1) [m²]: what is far needs no root."""
-    d0, d1, d2 = p0 - position[j, 0], p1 - position[j, 1], p2 - position[j, 2]
-    e0, e1 = position[j + 1, 0] - position[j, 0], position[j + 1, 1] - position[j, 1]
-    e2 = position[j + 1, 2] - position[j, 2]
-    t = min(max((d0 * e0 + d1 * e1 + d2 * e2) / (e0 * e0 + e1 * e1 + e2 * e2), 0.0), 1.0)
-    d0, d1, d2 = d0 - t * e0, d1 - t * e1, d2 - t * e2
-    return d0 * d0 + d1 * d1 + d2 * d2
-
-
-SLACK = 1.0 + 1e-9
-"""Of squares that are compared before a root is taken: larger than any rounding."""
 
 
 @kernel
@@ -86,6 +94,10 @@ def facing_contacts(rods, position, path):
             continue
         p, k = search.point[c], search.edge[c]
         a = search.point_edge[p]
+        if search.edge_right[a] >= 0 or search.edge_right[k] >= 0:
+            found, gap = _facing_facet(rods, position, path, c, found)
+            first, smallest = min(first, until[c]), min(smallest, gap)
+            continue
         i, j, s = edge_node[a], edge_node[k], search.point_fraction[p]
         p0 = (1.0 - s) * position[i, 0] + s * position[i + 1, 0]
         p1 = (1.0 - s) * position[i, 1] + s * position[i + 1, 1]
@@ -126,9 +138,116 @@ def facing_contacts(rods, position, path):
             contacts.point[n], contacts.multiplicity[n], contacts.inner[n] = p, multiplicity, kind == 0
             contacts.gap[n], contacts.distance[n] = gap, gap + radii
             node[n, 0], node[n, 1] = i, j
+            contacts.right[n, 0] = contacts.right[n, 1] = -1
             weight[n, 0], weight[n, 1], weight[n, 2], weight[n, 3] = 1.0 - s, s, t - 1.0, -t
             for m in range(3):
                 between = weight[n, 0] * position[i, m] + weight[n, 1] * position[i + 1, m]
                 between += weight[n, 2] * position[j, m] + weight[n, 3] * position[j + 1, m]
                 normal[n, m] = between / contacts.distance[n]
     return found, smallest, first
+
+
+@kernel
+def _facing_facet(rods, position, path, c, found):
+    """Append the contacts of the pair c, of which one edge is a ribbon's, to `found` ones, as `facing_contacts` does;
+    return how many there are then, and the smallest gap of those that are new [m].
+
+    The facet and its borders are three *views* of the edge. They count +1, −1 or 0 times each.
+    """
+    search, d_hat, smallest = rods.search, rods.d_hat, math.inf
+    p, k = search.point[c], search.edge[c]
+    radii = search.edge_radius[search.point_edge[p]] + search.edge_radius[k]
+    x, ribbon = place_of_point(search, position, p), search.edge_right[k] >= 0
+    facets, borders = 1.0, 0.0
+    if ribbon and search.point_sees[p] == BORDERS:
+        facets, borders = 0.0, 1.0
+    elif ribbon and search.point_sees[p] == INSIDE:
+        borders = -1.0
+    along, across, first = stack_vector(3), stack_vector(3), stack_vector(3)
+    factor, times = stack_vector(3), stack_vector(3)
+    factor[0], factor[1], factor[2] = facets, borders, borders
+    nearest = math.inf
+    for view in range(3):
+        along[view] = across[view] = 0.0
+        if factor[view] != 0.0:
+            along[view], across[view] = _nearest_in_view(search, position, k, view, x)
+            nearest = min(nearest, _gap_at(search, position, k, along[view], across[view], x, radii))
+    search.until[c] = path + nearest - d_hat
+    if nearest >= d_hat:
+        return found, smallest
+    for view in range(3):
+        first[view] = 1.0 if along[view] <= 0.0 else 0.0
+        if search.before[c] and factor[view] != 0.0:
+            other, _ = _nearest_in_view(search, position, search.edge_before[k], view, x)
+            first[view] -= 0.0 if other >= 1.0 else 1.0
+    for kind in range(3):  # the edge's inside, its start, its end where no other has that for its start
+        for view in range(3):
+            if kind == 0:
+                counts = 1.0 if 0.0 < along[view] < 1.0 else 0.0
+            elif kind == 1:
+                counts = first[view]
+            else:
+                counts = 1.0 if along[view] >= 1.0 and not search.after[c] else 0.0
+            times[view] = factor[view] * counts
+        t, v = 0.0 if kind == 1 else 1.0 if kind == 2 else along[0], across[0]
+        if kind > 0 and times[0] != 0.0:
+            v = across_at_end(search, position, k, t, x)
+        for view in range(3):
+            if view > 0:
+                t, v = along[view] if kind == 0 else t, float(view - 1)
+            elif times[0] != 0.0 and borders != 0.0 and (v == 0.0 or v == 1.0):
+                same = 1 if v == 0.0 else 2  # a border: all that cancels
+                if kind > 0 or t == along[same]:
+                    times[same] += times[0]
+                    continue
+            if times[view] == 0.0:
+                continue
+            gap = _gap_at(search, position, k, t, v, x, radii)
+            if not gap < d_hat:
+                continue
+            smallest = min(smallest, gap)
+            found += 1
+            if found <= rods.contacts.point.shape[0]:
+                multiplicity = int(times[view])
+                _write_contact(rods, position, found - 1, p, k, multiplicity, kind == 0, t, v, gap, gap + radii)
+    return found, smallest
+
+
+@kernel
+def _nearest_in_view(search, position, k, view, x):
+    """Return (t, v) of the place nearest to a point on an edge: its facet (view 0), its left or its right border."""
+    if view == 0:
+        return nearest_place(search, position, k, x)
+    r = search.edge_node[k] if view == 1 else search.edge_right[k]
+    return fraction_between(row(position, r), row(position, r + 1), x), float(view - 1)
+
+
+@kernel
+def _gap_at(search, position, k, t, v, x, radii):
+    """Return the gap of a point at x from a place of an edge [m]."""
+    away = combine(1.0, x, -1.0, place_on_facet(search, position, k, t, v))
+    return math.sqrt(dot(away, away)) - radii
+
+
+@kernel
+def _write_contact(rods, position, n, p, k, multiplicity, inner, t, v, gap, distance):
+    """Write a contact of ribbons as the n-th."""
+    search, contacts = rods.search, rods.contacts
+    a, s = search.point_edge[p], search.point_fraction[p]
+    contacts.point[n], contacts.multiplicity[n], contacts.inner[n] = p, multiplicity, inner
+    contacts.gap[n], contacts.distance[n], contacts.place[n, 0], contacts.place[n, 1] = gap, distance, t, v
+    weight = contacts.weight
+    for side in range(2):
+        edge = a if side == 0 else k
+        sign, along, across = (1.0, s, search.point_across[p]) if side == 0 else (-1.0, t, v)
+        right = search.edge_right[edge]
+        if right < 0:
+            across = 0.0
+        contacts.node[n, side], contacts.right[n, side] = search.edge_node[edge], right
+        weight[n, 2 * side] = sign * (1.0 - along) * (1.0 - across)
+        weight[n, 2 * side + 1] = sign * along * (1.0 - across)
+        weight[n, 4 + 2 * side] = sign * (1.0 - along) * across
+        weight[n, 5 + 2 * side] = sign * along * across
+    x, y = place_of_point(search, position, p), place_on_facet(search, position, k, t, v)
+    for m in range(3):
+        contacts.normal[n, m] = (x[m] - y[m]) / distance

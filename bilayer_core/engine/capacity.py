@@ -20,7 +20,7 @@ PAIRS_PER_POINT = 8
 MOST_SURFACE_PAIRS = 1_000_000
 """Points near surfaces: 0.8 kB each, with what friction and Hessians need of them."""
 MOST_CONTACTS = 500_000
-"""Places where rods touch: 1.1 kB each, with what friction and the Newton matrix need of them."""
+"""Places where rods touch: 1.1 kB each, of ribbons 2.9, with what friction and the Newton matrix need of them."""
 LARGEST_BORDER = 8e8
 """Memory of the border of the Newton matrix, which has columns where rods touch [bytes]."""
 ROW_MEMORY = 16

@@ -7,6 +7,7 @@ from bilayer_core.contact.near import gap_normal, place_of
 from bilayer_core.forces.bend_twist import bend_by_strains
 from bilayer_core.forces.rail_arms import write_rail_motions
 from bilayer_core.forces.rod_arms import add_step_of_arm, write_material_rate
+from bilayer_core.forces.rod_contact import moved_between
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.called import stack_matrix, stack_vector
 from bilayer_core.kinematics.rotating import inertia_tensor, solve_three
@@ -148,16 +149,13 @@ def _power_of_barriers(p, at, point, rates):
     if rods.exists:
         contacts, v, rails = rods.contacts, point.velocity, rods.rails
         if rails.exists and contacts.count[0] > 0:
-            write_rail_motions(rails, p.strands, rails.rate, point.velocity, point.spin, rails.node_motion)
-            v = rails.node_motion
+            write_rail_motions(rails, p.strands, rails.rate, point.velocity, point.spin, rails.motion)
+            v = rails.motion
         for c in range(contacts.count[0]):
-            i, j = contacts.node[c, 0], contacts.node[c, 1]
             scale = 0.5 * contacts.multiplicity[c] * rods.stiffness * rods.point_weight[contacts.point[c]]
             rate = 0.0
             for m in range(3):
-                moved = contacts.weight[c, 0] * v[i, m] + contacts.weight[c, 1] * v[i + 1, m]
-                moved += contacts.weight[c, 2] * v[j, m] + contacts.weight[c, 3] * v[j + 1, m]
-                rate += contacts.normal[c, m] * moved
+                rate += contacts.normal[c, m] * moved_between(v, contacts, c, m)
             if contacts.gap[c] > 0.0:
                 power += scale * barrier_gradient(contacts.gap[c], rods.d_hat) * rate
     return power

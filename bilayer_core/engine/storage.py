@@ -69,7 +69,8 @@ class Storage:
         near = self.sizes["contact_point"] if model.has_surface_contact and self.sizes["surface"] else 0
         columns = model.free_bodies.freedom.shape[1] + len(model.joins.first)
         first = min(points, FIRST_POINTS)
-        self._capacity = Capacity(near, first, first, columns)
+        contacts = first // 3 if self.sizes["ribbon leg"] else first  # which take as much memory
+        self._capacity = Capacity(near, contacts, contacts, columns)
         self._pairs = NearPairs(model.rod_search, PAIRS_PER_POINT * first) if points else None
         self.outcome = Outcome()
         self._width, self._memory = np.zeros(1, dtype=np.int64), np.zeros(memory_size(model))
@@ -154,12 +155,12 @@ class Storage:
         return sliding
 
     def _rod_contact(self, before: Problem | None) -> RodContact:
-        capacity, of_stage = self._capacity, RodContactList.zeros({"contact": self._capacity.sliding})
+        capacity, of_stage = self._capacity, RodContactList.zeros(self.sizes | {"contact": self._capacity.sliding})
         if before is not None:
             _take_over(before.rod_contact.sliding, of_stage, int(before.rod_contact.sliding.count[0]))
-        now = RodContactList.zeros({"contact": capacity.contacts})
+        now = RodContactList.zeros(self.sizes | {"contact": capacity.contacts})
         ways = np.array([0.0, -1.0, 0.0, -np.inf]) if before is None else before.rod_contact.ways
-        last = np.zeros((self.sizes["node"], 3)) if before is None else before.rod_contact.last
+        last = np.zeros((self.sizes["rail"], 3)) if before is None else before.rod_contact.last
         law = friction_law(self._model.scene, self._model.forces, self._friction)
         rails = self._model.rails.allocated(self.sizes) if before is None else before.rod_contact.rails
         return rod_contact_of(

@@ -1,10 +1,10 @@
 """Derivatives of rails (`contact.rails`) by the edges at their nodes.
 
-The arm of a rail is the mean of A = h m1 over the edges before and after its node (at an end there is one edge, alone).
-An increment (ε, θ) of an edge of length l with the tangent t moves A, by the parallel transport and turn of
+The arm of a rail is the mean of A = h m1 + b m2 over the edges before and after its node (at an end there is one edge,
+alone). An increment (ε, θ) of an edge of length l with the tangent t moves A, by the parallel transport and turn of
 `forces.bend_twist`, at first order with the *rate*
 
-    ∂A/∂ε = −t Aᵀ/l,   ∂A/∂θ = t × A = h m2
+    ∂A/∂ε = −t Aᵀ/l,   ∂A/∂θ = t × A
 
 and for a gradient g at second order by ½ of the quadratic form
 
@@ -17,13 +17,14 @@ four of that after.
 
 from __future__ import annotations
 
+from bilayer_core.contact.rails import has_arm
 from bilayer_core.jit import kernel
-from bilayer_core.kinematics.vector import cross, dot, row
+from bilayer_core.kinematics.vector import combine, cross, dot, row
 
 
 @kernel
 def _share(rails, i):
-    """Return the part that each edge at a node has in the arm, and the number of these edges."""
+    """Return the part that each edge at a node has in arms, and the number of these edges."""
     return (1.0, 1) if rails.node_edges[i, 0] == rails.node_edges[i, 1] else (0.5, 2)
 
 
@@ -34,68 +35,72 @@ def _first(strands, i, e):
 
 
 @kernel
+def _arm(rails, at, r, e):
+    """Return A of a rail by the directors of an edge, as a tuple [m]."""
+    return combine(rails.arm[r, 0], row(at.director1, e), rails.arm[r, 1], row(at.director2, e))
+
+
+@kernel
 def write_rail_rates(rails, strands, at, rate_out):
-    """Write the rates of all rails with a height, shape (n_node, 3, 8)."""
-    for i in range(rails.height.shape[0]):
-        if rails.height[i] == 0.0:
+    """Write the rates of all rails with an arm, shape (n_rail, 3, 8)."""
+    for r in range(rails.node.shape[0]):
+        if not has_arm(rails, r):
             continue
-        rate_out[i] = 0.0
+        i = rails.node[r]
+        rate_out[r] = 0.0
         share, count = _share(rails, i)
-        share *= rails.height[i]
         for side in range(count):
             e = rails.node_edges[i, side]
-            first, t, m, length = _first(strands, i, e), row(at.tangent, e), row(at.director1, e), at.length[e]
-            turned = cross(t, m)
+            first, t, a, length = _first(strands, i, e), row(at.tangent, e), _arm(rails, at, r, e), at.length[e]
+            turned = cross(t, a)
             for c in range(3):
                 for d in range(3):
-                    rate_out[i, c, first + d] = -share * t[c] * m[d] / length
-                rate_out[i, c, first + 3] = share * turned[c]
+                    rate_out[r, c, first + d] = -share * t[c] * a[d] / length
+                rate_out[r, c, first + 3] = share * turned[c]
 
 
 @kernel
 def hand_on(rails, strands, gradient, rate, node_out, edge_out):
     """Add a gradient by rails to those by nodes and edges."""
-    for i in range(rails.height.shape[0]):
-        g0, g1, g2 = gradient[i, 0], gradient[i, 1], gradient[i, 2]
+    for r in range(rails.node.shape[0]):
+        i, g0, g1, g2 = rails.node[r], gradient[r, 0], gradient[r, 1], gradient[r, 2]
         if g0 == 0.0 and g1 == 0.0 and g2 == 0.0:
             continue
         node_out[i, 0] += g0
         node_out[i, 1] += g1
         node_out[i, 2] += g2
-        if rails.height[i] == 0.0:
+        if not has_arm(rails, r):
             continue
         _, count = _share(rails, i)
         for side in range(count):
             e = rails.node_edges[i, side]
             first = _first(strands, i, e)
             for n in range(4):
-                edge_out[e, n] += g0 * rate[i, 0, first + n] + g1 * rate[i, 1, first + n] + g2 * rate[i, 2, first + n]
+                edge_out[e, n] += g0 * rate[r, 0, first + n] + g1 * rate[r, 1, first + n] + g2 * rate[r, 2, first + n]
 
 
 @kernel
-def arm_motion(rails, strands, rate, node_vectors, angles, i, c):
-    """Return the component c of what the arm of a rail with a height moves by, at first order, with its nodes and
-    edges.
-    """
-    moved = 0.0
+def arm_motion(rails, strands, rate, node_vectors, angles, r, c):
+    """Return the component c of what the arm of a rail moves by, at first order, with its nodes and edges."""
+    i, moved = rails.node[r], 0.0
     _, count = _share(rails, i)
     for side in range(count):
         e = rails.node_edges[i, side]
         first, n = _first(strands, i, e), strands.edge_node[e]
         for d in range(3):
-            moved += rate[i, c, first + d] * (node_vectors[n + 1, d] - node_vectors[n, d])
-        moved += rate[i, c, first + 3] * angles[e]
+            moved += rate[r, c, first + d] * (node_vectors[n + 1, d] - node_vectors[n, d])
+        moved += rate[r, c, first + 3] * angles[e]
     return moved
 
 
 @kernel
 def write_rail_motions(rails, strands, rate, node_vectors, angles, out):
     """Write the motions of rails at first order, from those of nodes and the turns of edges."""
-    for i in range(rails.height.shape[0]):
+    for r in range(rails.node.shape[0]):
         for c in range(3):
-            out[i, c] = node_vectors[i, c]
-            if rails.height[i] != 0.0:
-                out[i, c] += arm_motion(rails, strands, rate, node_vectors, angles, i, c)
+            out[r, c] = node_vectors[rails.node[r], c]
+            if has_arm(rails, r):
+                out[r, c] += arm_motion(rails, strands, rate, node_vectors, angles, r, c)
 
 
 @kernel
@@ -118,15 +123,14 @@ def write_rail_curvature(rails, strands, at):
         for m in range(4):
             for n in range(4):
                 out[e, m, n] = 0.0
-    for i in range(rails.height.shape[0]):
-        g = row(rails.gradient, i)
-        if rails.height[i] == 0.0 or (g[0] == 0.0 and g[1] == 0.0 and g[2] == 0.0):
+    for r in range(rails.node.shape[0]):
+        i, g = rails.node[r], row(rails.gradient, r)
+        if not has_arm(rails, r) or (g[0] == 0.0 and g[1] == 0.0 and g[2] == 0.0):
             continue
         share, count = _share(rails, i)
-        share *= rails.height[i]
         for side in range(count):
             e = rails.node_edges[i, side]
-            t, a, length = row(at.tangent, e), row(at.director1, e), at.length[e]
+            t, a, length = row(at.tangent, e), _arm(rails, at, r, e), at.length[e]
             turned, along = cross(t, a), dot(g, t)
             across = g[0] - along * t[0], g[1] - along * t[1], g[2] - along * t[2]
             s = share / (length * length)

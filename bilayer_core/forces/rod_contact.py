@@ -22,8 +22,16 @@ segment, and a = 0 at a node. So each contact adds
     w_m w_l M − κ a_m a_lᵀ,   M = c b″ n nᵀ + κ (I − n nᵀ),   κ = c b′/D ≤ 0,   c = ± ½ K_c Δl.
 
 κ is the tendency of two round things that are pressed together to slip off each other; along v, across both, nothing
-holds a pair of straight rods but friction. That is so for round rods. Faces of ribbons are flat, and the width is not
-seen here.
+holds a pair of straight rods but friction.
+
+**Ribbons** have facets Q(t, v) of four rails, and points between four (`contact.facet`): eight x_m with weights w_m.
+With e = ∂Q/∂t, f = ∂Q/∂v, g = e·f − D n·∂²Q/∂t∂v, and β_m, γ_m the rates of −w_m with t and v,
+
+    ∂²D/∂x_m ∂x_l = [w_m w_l (I − n nᵀ) − a_m a_lᵀ − c_m c_lᵀ]/D
+
+    a_m = (w_m e + D β_m n)/|e|,   c_m = (w_m f + D γ_m n − g/|e| a_m)/√(|f|² − g²/|e|²)
+
+where a is left out if t is that of an end (and then g), and c if v is that of a border.
 
 **Friction** is lagged as in `forces.surface_friction`: s, t, n and λ = −c b′ are those at the start of the step, and
 
@@ -46,7 +54,16 @@ from bilayer_core.contact.broad_phase import near_pairs
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
 from bilayer_core.contact.rails import most_of_turn, place_rails, write_rail_steps, write_swings
 from bilayer_core.contact.rod_bound import rod_step_bound
-from bilayer_core.contact.rod_list import FIRST, PATH, begin_list, end_list, largest_motion, list_serves, reachable
+from bilayer_core.contact.rod_list import (
+    FIRST,
+    LEFT,
+    PATH,
+    begin_list,
+    end_list,
+    largest_motion,
+    list_serves,
+    reachable,
+)
 from bilayer_core.contact.segment import facing_contacts
 from bilayer_core.forces.rail_arms import (
     hand_on,
@@ -111,10 +128,11 @@ def bound_between_rods(p, at):
         swing = write_swings(rails, p.strands, p.system, at, limit)
         move += 2.0 * swing  # the mean of all taken off
     limit = reachable(move, limit, rods.unit)
-    if rails.exists:
+    serves = limit * move <= rods.ways[LEFT]  # whatever the ways
+    if rails.exists and not serves:
         write_rail_steps(rails, p.strands, p.system, at, limit)
         step, stray = rails.step, 0.5 * limit * swing
-    if not list_near_rods(p, place, step, limit, limit * move, stray):
+    if not serves and not list_near_rods(p, place, step, limit, limit * move, stray):
         outcome.status = ROD_CAPACITY_EXCEEDED
         return 0.0
     return rod_step_bound(rods, p.strands, p.system, at, place, limit, 2.0 * limit * move)
@@ -135,9 +153,10 @@ def _freeze(rods):
         scale = 0.5 * found.multiplicity[c] * rods.stiffness * rods.point_weight[found.point[c]]
         sliding.normal_force[c] = -scale * barrier_gradient(found.gap[c], rods.d_hat)
         sliding.node[c, 0], sliding.node[c, 1] = found.node[c, 0], found.node[c, 1]
+        sliding.right[c, 0], sliding.right[c, 1] = found.right[c, 0], found.right[c, 1]
         for m in range(3):
             sliding.normal[c, m] = found.normal[c, m]
-        for m in range(4):
+        for m in range(found.weight.shape[1]):
             sliding.weight[c, m] = found.weight[c, m]
 
 
@@ -232,6 +251,8 @@ def _add_barrier(rods, position, gradient):
             gradient[i + 1, m] += w1 * force
             gradient[j, m] += w2 * force
             gradient[j + 1, m] += w3 * force
+            if weight.shape[1] > 4:
+                _add_to_borders(contacts, c, m, force, gradient)
             square += (position[j + 1, m] - position[j, m]) ** 2
         length = math.sqrt(square)
         for m in range(3):
@@ -245,19 +266,97 @@ def _add_barrier(rods, position, gradient):
             foot_gradient[c, 1, m] = w1 * along
             foot_gradient[c, 2, m] = w2 * along - across
             foot_gradient[c, 3, m] = w3 * along + across
+        if weight.shape[1] > 4:
+            _write_feet(contacts, position, c)
     return energy
+
+
+@kernel
+def _add_to_borders(contacts, c, m, force, gradient):
+    """Add component m of what acts on a contact to the right borders of its two sides."""
+    for side in range(2):
+        r = contacts.right[c, side]
+        if r >= 0:
+            gradient[r, m] += contacts.weight[c, 4 + 2 * side] * force
+            gradient[r + 1, m] += contacts.weight[c, 5 + 2 * side] * force
+
+
+@kernel
+def _write_feet(contacts, position, c):
+    """Write the gradients of the nearest place on a facet, and the direction along it."""
+    t, v = contacts.place[c, 0], contacts.place[c, 1]
+    along_out, across_out = contacts.foot_gradient, contacts.cross_gradient
+    j, r = contacts.node[c, 1], contacts.right[c, 1]
+    for n in range(8):
+        for m in range(3):
+            across_out[c, n, m] = 0.0
+            if n > 3 or r >= 0:
+                along_out[c, n, m] = 0.0
+    if r < 0:  # the foot is that on a segment: its weights are those of the point's four rails
+        if contacts.inner[c]:
+            for m in range(3):
+                for n in range(2):
+                    along_out[c, 4 + n, m] = contacts.weight[c, 4 + n] * contacts.segment_direction[c, m]
+        return
+    e, f, turned, away = stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
+    tt, vv, tv = 0.0, 0.0, 0.0
+    for m in range(3):
+        l0, l1, r0, r1 = position[j, m], position[j + 1, m], position[r, m], position[r + 1, m]
+        e[m], f[m] = (1.0 - v) * (l1 - l0) + v * (r1 - r0), (1.0 - t) * (r0 - l0) + t * (r1 - l1)
+        turned[m], away[m] = l0 - l1 - r0 + r1, contacts.distance[c] * contacts.normal[c, m]
+        tt, vv = tt + e[m] * e[m], vv + f[m] * f[m]
+        tv += e[m] * f[m] - away[m] * turned[m]
+    inner, free = contacts.inner[c], 0.0 < v < 1.0
+    over, length = (tv / tt, math.sqrt(tt)) if inner else (0.0, math.sqrt(tt))
+    rest = vv - over * tv
+    for n in range(8):
+        left = 1.0 if n < 4 else 0.0  # of two borders
+        end = n % 2
+        of_b = 2 <= n < 4 or n >= 6
+        by_t = (1.0 if end == 1 else -1.0) * ((1.0 - v) if left == 1.0 else v) if of_b else 0.0
+        by_v = (-1.0 if left == 1.0 else 1.0) * (t if end == 1 else 1.0 - t) if of_b else 0.0
+        for m in range(3):
+            first = contacts.weight[c, n] * e[m] + by_t * away[m]
+            second = contacts.weight[c, n] * f[m] + by_v * away[m]
+            if inner:
+                along_out[c, n, m] = first / length
+            if free and rest > 0.0:
+                across_out[c, n, m] = (second - over * first) / math.sqrt(rest)
+    for m in range(3):
+        contacts.segment_direction[c, m] = e[m] / length
 
 
 @kernel
 def _moved(vectors, origin, contacts, c, m):
     """Return the component m of Σ w_m (x_m − x_m⁰) at a contact [m]."""
     i, j, weight = contacts.node[c, 0], contacts.node[c, 1], contacts.weight
-    return (
+    moved = (
         weight[c, 0] * (vectors[i, m] - origin[i, m])
         + weight[c, 1] * (vectors[i + 1, m] - origin[i + 1, m])
         + weight[c, 2] * (vectors[j, m] - origin[j, m])
         + weight[c, 3] * (vectors[j + 1, m] - origin[j + 1, m])
     )
+    if weight.shape[1] > 4:
+        for side in range(2):
+            r = contacts.right[c, side]
+            if r >= 0:
+                moved += weight[c, 4 + 2 * side] * (vectors[r, m] - origin[r, m])
+                moved += weight[c, 5 + 2 * side] * (vectors[r + 1, m] - origin[r + 1, m])
+    return moved
+
+
+@kernel
+def moved_between(vectors, contacts, c, m):
+    """Return the component m of Σ w_m v_m at a contact."""
+    i, j, weight = contacts.node[c, 0], contacts.node[c, 1], contacts.weight
+    moved = weight[c, 0] * vectors[i, m] + weight[c, 1] * vectors[i + 1, m]
+    moved += weight[c, 2] * vectors[j, m] + weight[c, 3] * vectors[j + 1, m]
+    if weight.shape[1] > 4:
+        for side in range(2):
+            r = contacts.right[c, side]
+            if r >= 0:
+                moved += weight[c, 4 + 2 * side] * vectors[r, m] + weight[c, 5 + 2 * side] * vectors[r + 1, m]
+    return moved
 
 
 @kernel
@@ -290,6 +389,8 @@ def _add_friction(rods, stage, position, origin, gradient):
             gradient[i + 1, m] += weight[c, 1] * ratio * slip[m]
             gradient[j, m] += weight[c, 2] * ratio * slip[m]
             gradient[j + 1, m] += weight[c, 3] * ratio * slip[m]
+            if weight.shape[1] > 4:
+                _add_to_borders(contacts, c, m, ratio * slip[m], gradient)
             for n in range(3):
                 matrix[c, m, n] = excess * slip[m] * slip[n] - ratio * normal[c, m] * normal[c, n]
             matrix[c, m, m] += ratio
@@ -322,17 +423,15 @@ def rod_slip_along(rods, strands, stage, at, system, begin, path_out):
     position, origin, node_step = at.position, stage.origin_position, system.node_step
     if rails.exists and contacts.count[0] > 0:
         write_rail_slips(rails, strands, stage, at)
-        write_rail_motions(rails, strands, rails.slip_rate, system.node_step, system.angle_step, rails.node_motion)
-        position, origin, node_step = rails.slip, rods.no_step, rails.node_motion
-    node, weight, normal = contacts.node, contacts.weight, contacts.normal
+        write_rail_motions(rails, strands, rails.slip_rate, system.node_step, system.angle_step, rails.motion)
+        position, origin, node_step = rails.slip, rods.no_step, rails.motion
+    normal = contacts.normal
     slip, rate = stack_vector(3), stack_vector(3)
     for c in range(contacts.count[0]):
-        i, j = node[c, 0], node[c, 1]
         of_slip, of_rate = 0.0, 0.0
         for m in range(3):
             slip[m] = _moved(position, origin, contacts, c, m)
-            rate[m] = weight[c, 0] * node_step[i, m] + weight[c, 1] * node_step[i + 1, m]
-            rate[m] += weight[c, 2] * node_step[j, m] + weight[c, 3] * node_step[j + 1, m]
+            rate[m] = moved_between(node_step, contacts, c, m)
             of_slip += slip[m] * normal[c, m]
             of_rate += rate[m] * normal[c, m]
         square, together, total = 0.0, 0.0, 0.0

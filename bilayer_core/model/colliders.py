@@ -13,6 +13,9 @@ from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.profile import values_at
 from bilayer_core.scene.rod import Rod
 
+ROUND = 2.0
+"""Width over thickness up to which a section counts as round where rods meet."""
+
 
 class Mobility(IntEnum):
     """How something moves."""
@@ -120,15 +123,20 @@ def _contact_pairs(scene: SceneConfig, dimension: int) -> tuple[ContactPair, ...
     return tuple(pairs)
 
 
-def is_ribbon(rod: Rod) -> bool:
-    """Return whether a rod is wider than thick somewhere."""
-    return rod.keep("ribbon", (), lambda: _is_ribbon(rod))
+def is_ribbon(rod: Rod, times: float = 1.0) -> bool:
+    """Return whether a rod is somewhere wider than thick, or than some times its thickness."""
+    return rod.keep(("ribbon", times), (), lambda: _is_ribbon(rod, times))
 
 
-def _is_ribbon(rod: Rod) -> bool:
+def meets_with_borders(rod: Rod) -> bool:
+    """Return whether a rod has borders for other rods in space: `contact.rails`."""
+    return not rod.closed and is_ribbon(rod, ROUND)
+
+
+def _is_ribbon(rod: Rod, times: float) -> bool:
     stations = np.arange(rod.stations)
     _, thickness = outline(rod, stations)
-    return bool(np.any(values_at(rod.width, rod.edge_length * stations) > thickness.sum(axis=0) * (1.0 + 1e-9)))
+    return bool(np.any(values_at(rod.width, rod.edge_length * stations) > times * thickness.sum(axis=0) * (1.0 + 1e-9)))
 
 
 def _points_of_rods(scene: SceneConfig, dimension: int, kind: str) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from bilayer_core.errors import SceneError
-from bilayer_core.model.colliders import ContactPair, contact_pairs, is_ribbon
+from bilayer_core.model.colliders import ContactPair, contact_pairs, meets_with_borders
 from bilayer_core.model.dragged_bodies import dry_bodies
 from bilayer_core.model.findings import Figure, few, told
 from bilayer_core.model.force_list import planned
@@ -186,11 +186,7 @@ def _contact_pairs(scene: SceneConfig, dimension: int) -> tuple[str, ...]:
     """Return which surfaces can meet and how; many of one kind on one line."""
     pairs = [
         *contact_pairs(scene, dimension),
-        *(
-            ContactPair(pair.what, f"round the curves of their nodes{_left_out(scene, pair)}")
-            for pair in rod_pairs(scene)
-            if pair.active
-        ),
+        *(ContactPair(pair.what, _how_rods_meet(scene, pair, dimension)) for pair in rod_pairs(scene) if pair.active),
     ]
     kinds: dict[str, list[str]] = {}
     for pair in pairs:
@@ -202,6 +198,8 @@ def _contact_pairs(scene: SceneConfig, dimension: int) -> tuple[str, ...]:
     )
 
 
-def _left_out(scene: SceneConfig, pair: RodPair) -> str:
-    ribbons = is_ribbon(scene.rods[pair.first]) or is_ribbon(scene.rods[pair.second])
-    return ", without borders of ribbons" if ribbons else ""
+def _how_rods_meet(scene: SceneConfig, pair: RodPair, dimension: int) -> str:
+    first, second = (meets_with_borders(scene.rods[index]) for index in (pair.first, pair.second))
+    if dimension == 2 or not (first or second):
+        return "as round as they are thick"
+    return "as flat ribbons with borders" if first and second else "a flat ribbon with borders, and one that is round"

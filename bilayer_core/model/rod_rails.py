@@ -1,10 +1,11 @@
-"""Rails of rods that meet, where their curves are not in the middle between their faces; see `contact.rails`."""
+"""Rails of rods that meet, where they are not round about their curves; see `contact.rails`."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from bilayer_core.jit import UNALLOCATED
+from bilayer_core.kinematics.frame_strains import cross
 from bilayer_core.model.records.contacts import Rails
 from bilayer_core.model.rod_points import NO_ARM
 from bilayer_core.model.strands import Collected
@@ -12,34 +13,49 @@ from bilayer_core.model.strands import Collected
 Array = np.ndarray
 
 
-def rail_heights(found: Collected) -> Array:
-    """Return the heights of the middle between the faces over the nodes [m], shape (n_node,).
+def build_rails(found: Collected, ribbons: set[str]) -> Rails:
+    """Return the record, absent if the rails are the nodes.
 
-    Closed strands have none: there rods meet round their curve, up to the farther face.
+    Closed strands have neither heights nor borders: there rods meet round their curve, up to the farther face.
+
+    Parameters
+    ----------
+    found : Collected
+    ribbons : set of str
+        Names of rods that have borders.
     """
-    heights = [
-        np.where(strand.closed | (np.abs(strand.offset) <= NO_ARM * strand.thickness), 0.0, strand.offset)
-        for strand in found.strands
-    ]
-    return np.concatenate(heights)
-
-
-def build_rails(found: Collected) -> Rails:
-    """Return the record, absent if the rails are the nodes."""
-    height = rail_heights(found)
-    if not height.any():
+    node = np.arange(found.node_count)
+    height, border = np.zeros((2, found.node_count))
+    right = np.full(found.edge_count, -1)
+    extra = []
+    for strand in found.strands:
+        own = slice(strand.first_node, strand.first_node + strand.node_count)
+        if not strand.closed:
+            height[own] = np.where(np.abs(strand.offset) <= NO_ARM * strand.thickness, 0.0, strand.offset)
+        if strand.rod in ribbons:
+            border[own] = np.maximum(0.5 * (strand.width - strand.thickness), 0.0)
+            first = found.node_count + sum(map(len, extra))
+            right[strand.first_edge : strand.first_edge + strand.node_count - 1] = first + np.arange(
+                strand.node_count - 1
+            )
+            extra.append(node[own])
+    arm = np.stack([height, -border], axis=1)
+    if not arm.any():
         return Rails.absent()
-    edges = found.column("node_edges", np.int64, 2)
-    slope = np.abs(height) / found.column("rest_length")[edges].min(axis=1)
-    turn = np.abs(height) / found.column("half_width")[edges].min(axis=1)
+    node = np.concatenate([node, *extra])
+    arm = np.concatenate([arm, *([1.0, -1.0] * arm[own] for own in extra)])
+    edges, size = found.column("node_edges", np.int64, 2), np.linalg.norm(arm, axis=1)
+    slope = size / found.column("rest_length")[edges[node]].min(axis=1)
+    turn = size / found.column("half_width")[edges[node]].min(axis=1)
     factor = float(np.max(1.0 + 4.0 * slope + turn))  # half of the lengths is left at least
-    return Rails.zeros(UNALLOCATED, height=height, node_edges=edges, factor=factor)
+    return Rails.zeros(UNALLOCATED, node=node, arm=arm, right=right, node_edges=edges, factor=factor)
 
 
 def start_rails(found: Collected, rails: Rails) -> Array:
-    """Return the positions of rails at the start [m], shape (n_node, 3)."""
+    """Return the positions of rails at the start [m], shape (n_rail, 3)."""
     position = found.column("position", width=3)
     if not rails.exists:
         return position
-    m1 = found.column("director1", width=3)[rails.node_edges].mean(axis=1)
-    return position + rails.height[:, None] * m1
+    m1, tangent = found.column("director1", width=3), found.column("tangent", width=3)
+    directions = np.stack([m1, cross(tangent, m1)], axis=1)[rails.node_edges[rails.node]].mean(axis=1)
+    return position[rails.node] + np.einsum("rd,rdc->rc", rails.arm, directions)

@@ -5,6 +5,10 @@ The points of an edge divide it evenly, or the segment between its rails (`conta
 between them, whatever the mesh. A point stands for the length between the
 middles to its neighbours, at the ends for half of it.
 
+A ribbon has few points along its middle and along either border, an edge or a quarter of its width apart, which stand
+for a half and a quarter of its length each; as many across its ends as on a round rod; and as many along either border
+for where borders meet, see `contact.segment`.
+
 A point sees edges of its own rod from the arc distance `rod_exclusion` on, all layers alike: the larger of `FEW_EDGES`
 edges and π/2 (H + d̂), with H the thickness of the rod, or of a closed one twice the radius about its nodes where these
 are nearer to one face. A rod that met itself nearer than that would be bent more sharply than half of it.
@@ -20,11 +24,13 @@ from itertools import groupby
 import numpy as np
 
 from bilayer_core.contact.broad_phase import RodSearch, near_pairs, tree_size
+from bilayer_core.contact.facet import BORDERS, INSIDE, WHOLE
 from bilayer_core.errors import SceneError
 from bilayer_core.jit import UNALLOCATED
+from bilayer_core.model.colliders import meets_with_borders
 from bilayer_core.model.records.contacts import Rails
 from bilayer_core.model.rod_pairs import rod_pairs
-from bilayer_core.model.rod_rails import build_rails, rail_heights, start_rails
+from bilayer_core.model.rod_rails import build_rails, start_rails
 from bilayer_core.model.strand_arrays import StrandArrays
 from bilayer_core.model.strands import Collected
 from bilayer_core.model.validity import edge_figures
@@ -38,10 +44,12 @@ MOST_POINTS = 5_000_000
 """Of all rods: 80 bytes each while they are made, as measured."""
 MOST_PAIRS = 10_000_000
 """Points near other rods: 26 bytes each."""
+ACROSS = 0.25
+"""Of its width: how far apart the few points of a ribbon are at most, along it."""
 FEW_EDGES = 2  # that a point is away from the nearest edge of its own rod that it sees, at least
 
 
-def build_rod_surfaces(scene: SceneConfig, found: Collected) -> tuple[RodSearch, Array, Rails]:
+def build_rod_surfaces(scene: SceneConfig, found: Collected, in_plane: bool) -> tuple[RodSearch, Array, Rails]:
     """Return the search for rods that meet, absent if none can, the length of rod that its points stand for [m], and
     the rails along which they meet.
 
@@ -65,9 +73,12 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> tuple[RodSearch,
         can_collide[np.ix_(first, second)] |= meet
         can_collide[np.ix_(second, first)] |= meet.T
     joined = _joined(scene, rods)
-    rails, rest_length = build_rails(found), found.column("rest_length")
+    flat = {copy.name for index, copy in copies if meets_with_borders(scene.rods[index]) and not in_plane}
+    rails, rest_length = build_rails(found, flat), found.column("rest_length")
     half = 0.5 * np.concatenate([strand.thickness for strand in found.strands])
-    node_radius = np.where(rail_heights(found) != 0.0, half, found.column("node_radius"))
+    round_closed = np.concatenate([np.full(strand.node_count, strand.closed) for strand in found.strands])
+    node_radius = np.where(round_closed, found.column("node_radius"), half)
+    right = rails.right if rails.exists else np.full(found.edge_count, -1)
     thickness = [float(edge_figures(scene, rod).thickness.max()) for rod in scene.rods]
     thickest = [thickness[index] for index in scene_index]
     for strand in found.strands:
@@ -85,18 +96,33 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> tuple[RodSearch,
         number, edges = numbers[strand.rod], strand.shown - 1
         radius = float(node_radius[strand.first_node : strand.first_node + strand.node_count].max())
         longest = float(rest_length[strand.first_edge : strand.first_edge + edges].max())
-        per_edge = max(1, math.ceil(longest / radius * (1.0 - 1e-9))) if meets[number] else 0
+        spacings, ends = [radius], ()
+        if right[strand.first_edge] >= 0:
+            spacings.append(max(radius, ACROSS * float(strand.width.min())))
+            ends = tuple(_points_across(rails, node, radius) for node in (strand.first_node, strand.first_node + edges))
+        per_edge = tuple(max(1, math.ceil(longest / each * (1.0 - 1e-9))) for each in spacings)
+        if not meets[number]:
+            per_edge, ends = (0,), ()
         alone = strand.first_edge if strand.closed else -1
-        return rods[number].edge_length, strand.first_station, edges, radius, per_edge, alone
+        return rods[number].edge_length, strand.first_station, edges, radius, per_edge, ends, alone
 
     total = 0
-    for (spacing, start, edges, radius, per_edge, _), alike in groupby(found.strands, kind):
+    for (spacing, start, edges, radius, per_edge, ends, _), alike in groupby(found.strands, kind):
         strands = list(alike)
-        total += per_edge * edges * len(strands)
+        count = per_edge[0] * edges
+        if ends:
+            count = 2 * (count + 1) + 3 * (per_edge[1] * edges - 1) + sum(ends)
+        total += count * len(strands)
         if total > MOST_POINTS:
             raise _too_thin(scene, strands[0], radius, total)
         order = np.array([[strand.first_edge] for strand in strands]) + np.arange(edges)
-        own = _strand_points(spacing, start, rest_length[order], per_edge, strands[0].closed)
+        own = _strand_points(spacing, start, rest_length[order], per_edge[0], strands[0].closed)
+        if ends:
+            few = _strand_points(spacing, start, rest_length[order], per_edge[1], False)
+            own = _ribbon_points(few, own, len(strands), ends)
+        else:
+            count = len(own["point_fraction"])
+            own |= {"point_across": np.zeros(count), "point_sees": np.full(count, WHOLE)}
         before, after = order - 1, order + 1
         before[:, 0], after[:, -1] = (order[0, -1], order[0, 0]) if strands[0].closed else (-1, -1)
         own |= {
@@ -121,6 +147,7 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected) -> tuple[RodSearch,
         UNALLOCATED,
         start_position=start_rails(found, rails),
         edge_node=found.column("edge_node", np.int64),
+        edge_right=right,
         **arrays,
         first_point=np.concatenate([[0], np.cumsum(counts)]),
         rod_can_collide=can_collide,
@@ -186,6 +213,51 @@ def _strand_points(spacing: float, start: int, length: Array, per_edge: int, clo
     }
 
 
+def _points_across(rails: Rails, node: int, radius: float) -> int:
+    """Return the number of points across the end of a ribbon: no farther apart than its radius, at least three."""
+    return max(3, 1 + math.ceil(2.0 * abs(rails.arm[node, 1]) / radius * (1.0 - 1e-9)))
+
+
+def _ribbon_points(
+    few: dict[str, Array], many: dict[str, Array], count: int, ends: tuple[int, int]
+) -> dict[str, Array]:
+    """Return the points of alike ribbons from those on their curves, a few and many of them per edge.
+
+    The few become three each, a quarter of the weight at either border, and as many as `ends` says across the ends. The
+    many lie on both borders, with as much weight there.
+    """
+    copies = np.full(len(few["point_fraction"]) // count, 3)
+    copies[0], copies[-1] = ends
+    index = np.repeat(np.arange(len(copies)), copies)
+    across = np.concatenate([np.linspace(0.0, 1.0, n) for n in copies])
+    at_border = (across == 0.0) | (across == 1.0)
+    share = np.where(at_border, 0.25, 0.5 / (copies[index] - 2.0))
+    twice = np.repeat(np.arange(len(many["point_fraction"]) // count), 2)
+    edges = len(few["points_of_edge"]) // count
+    edge = np.concatenate([_edge_of_point(few, edges)[index], _edge_of_point(many, edges)[twice]])
+    order = np.argsort(edge, kind="stable")
+
+    def both(name: str, factor: Array | float = 1.0) -> Array:
+        rows = [points[name].reshape(count, -1)[:, of] for points, of in ((few, index), (many, twice))]
+        return (np.concatenate(rows, axis=1) * factor)[:, order].ravel()
+
+    across = np.concatenate([across, np.arange(len(twice)) % 2])
+    sees = np.concatenate([np.where(at_border, INSIDE, WHOLE), np.full(len(twice), BORDERS)])
+    return few | {
+        "point_fraction": both("point_fraction"),
+        "point_arc": both("point_arc"),
+        "point_weight": both("point_weight", np.concatenate([share, np.full(len(twice), 0.25)])),
+        "point_across": np.tile(across[order], count),
+        "point_sees": np.tile(sees[order], count),
+        "points_of_edge": np.tile(np.bincount(edge, minlength=edges), count),
+    }
+
+
+def _edge_of_point(points: dict[str, Array], edges: int) -> Array:
+    """Return the edge of each point of a strand of so many edges."""
+    return np.repeat(np.arange(edges), points["points_of_edge"][:edges])
+
+
 class NearPairs:
     """Points and segments of rods that are near each other.
 
@@ -197,7 +269,7 @@ class NearPairs:
 
     def __init__(self, search: RodSearch, capacity: int = 0):
         edges = len(search.edge_node)
-        sizes = {"node": len(search.start_position), "edge": edges, "tree": tree_size(edges), "near pair": capacity}
+        sizes = {"rail": len(search.start_position), "edge": edges, "tree": tree_size(edges), "near pair": capacity}
         self.search = search.allocated(sizes)
 
     @property
@@ -219,7 +291,7 @@ class NearPairs:
         self, base: Array, touch: float, search_distance: float, tip: Array | None = None, most: int = MOST_PAIRS
     ) -> None:
         """List the pairs with a gap below `search_distance` [m] where nodes are, or on their straight way from
-        `base` to `tip` [m], shape (n_node, 3), the first `most` of them; for `touch` see `near_pairs`.
+        `base` to `tip` [m], shape (n_rail, 3), the first `most` of them; for `touch` see `near_pairs`.
         """
         self.search.base[:], self.search.tip[:] = base, base if tip is None else tip
         while (found := near_pairs(self.search, touch, search_distance)) > self.capacity and self.capacity < most:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from bilayer_core.model.force_list import on_nodes
 from bilayer_core.model.force_slots import NAMES
 from bilayer_core.model.model import Model
-from bilayer_core.model.unknown_order import OF_RAILS
+
+ROWS_OF_BLOCK = 64
+"""Of a border with many columns, see `engine.linear.wide_border`."""
 
 
 def sizes_of(model: Model) -> dict[str, int]:
@@ -15,7 +17,9 @@ def sizes_of(model: Model) -> dict[str, int]:
     edges = rods.edge_count + len(model.constrained.clamp_edge_body)
     in_plane, in_fluid = model.plane.exists, model.fluid.exists
     impacts, joints, pairs = len(model.impact_pairs), len(rods.joint_a), len(model.bonds.joint)
-    raised = len(model.raised.edge)
+    raised, rails = len(model.raised.edge), model.rails.exists
+    ribbons = rails and len(model.rails.node) > model.node_count
+    side = (4 * layout.dimension + (3 if layout.dimension == 3 else 0)) if rails else 2 * layout.dimension
     return {
         "node": model.node_count,
         "edge": rods.edge_count,
@@ -35,10 +39,15 @@ def sizes_of(model: Model) -> dict[str, int]:
         "free": model.free_count,
         "body unknown": 6 * model.free_count,
         "dimension": layout.dimension,
-        "sides": 2 * (OF_RAILS[layout.dimension] + 1 if model.rails.exists else 2 * layout.dimension),
+        "rail": len(model.rails.node) if rails else model.node_count,
+        "sides": 2 * side,
+        "ribbon sides": 2 * side if ribbons else 0,
+        "leg": 8 if ribbons else 4,
+        "ribbon leg": 8 if ribbons else 0,
         "unknown": model.layout.size,
         "matrix unknown": layout.size,
         "row": layout.size + layout.half_bandwidth,
+        "block of rows": (layout.size + layout.half_bandwidth) // ROWS_OF_BLOCK + 1,
         "band": layout.half_bandwidth + 1,
         "force": len(NAMES),
         "channel": len(scene.stimuli),

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bilayer_core.contact.broad_phase import RodSearch
+from bilayer_core.contact.facet import INSIDE
 from bilayer_core.errors import PenetrationError
 from bilayer_core.model.contact_points import contact_point_names, start_contact_points
 from bilayer_core.model.model import Model
@@ -87,9 +89,29 @@ def rod_gaps(model: Model, within: float) -> RodGaps:
     between = (1.0 - s) * position[i] + s * position[i + 1] - position[j]
     t = np.clip((between * along).sum(axis=1) / (along * along).sum(axis=1), 0.0, 1.0)
     radii = rods.edge_radius[own] + rods.edge_radius[edge]
-    gap = np.linalg.norm(between - t[:, None] * along, axis=1) - radii
+    gap = pairs.search.until[: pairs.count] + model.scene.contact.barrier_distance
     gap[np.abs(gap) <= ROUNDING * radii] = 0.0
+    twice = rods.point_sees[point] == INSIDE
+    twice[twice] = _are_beside(rods, point[twice], edge[twice], (gap + radii)[twice])
+    point, own, s, edge, t, gap = (of_all[~twice] for of_all in (point, own, s, edge, t, gap))
     return RodGaps(point, own, s[:, 0], edge, t, gap)
+
+
+def _are_beside(rods: RodSearch, point: Array, edge: Array, distance: Array) -> Array:
+    """Return whether the places of ribbons nearest to points are on their borders, where other points count."""
+    at, s, v = rods.start_position, rods.point_fraction[point][:, None], rods.point_across[point][:, None]
+    own = rods.point_edge[point]
+
+    def along(rail: Array, fraction: Array) -> Array:
+        return (1.0 - fraction) * at[rail] + fraction * at[rail + 1]
+
+    place = (1.0 - v) * along(rods.edge_node[own], s) + v * along(rods.edge_right[own], s)
+    nearest = np.full(len(point), np.inf)
+    for rail in (rods.edge_node[edge], rods.edge_right[edge]):
+        way = at[rail + 1] - at[rail]
+        t = np.clip(((place - at[rail]) * way).sum(axis=1) / (way * way).sum(axis=1), 0.0, 1.0)
+        nearest = np.minimum(nearest, np.linalg.norm(place - along(rail, t[:, None]), axis=1))
+    return nearest <= distance * (1.0 + ROUNDING)
 
 
 def _place(model: Model, edge: int, fraction: float) -> str:

@@ -21,8 +21,9 @@ HALF_BANDWIDTH = {
     3: {1: 10, 2: 18},
     2: {1: 5, 2: 9},
 }  # by dimension and number of layers: (x θ x θ x) of one layer spans 11 unknowns, 19 with the other's between
-OF_RAILS = {3: 14, 2: 7}
-"""By dimension: the unknowns of an edge's rails (`contact.rails`), (x θ x θ x θ x) of one layer, span 15."""
+OF_RAILS = {3: {1: 14, 2: 26}, 2: {1: 7, 2: 9}}
+"""Likewise with rails (`contact.rails`): those of an edge, (x θ x θ x θ x) of one layer, span 15 unknowns. In a plane
+those of two layers are the nodes."""
 
 
 class ReadOnlyArrays:
@@ -125,7 +126,5 @@ def number_unknowns(
     attached_of_unknown[(attached[:, None] + np.arange(dimension)).ravel()] = np.repeat(
         np.arange(len(attached)), dimension
     )
-    half_bandwidth = HALF_BANDWIDTH[dimension][max(len(layers) for layers in rods)]
-    if has_rails:
-        half_bandwidth = max(half_bandwidth, OF_RAILS[dimension])
+    half_bandwidth = (OF_RAILS if has_rails else HALF_BANDWIDTH)[dimension][max(len(layers) for layers in rods)]
     return Layout(size, half_bandwidth, dimension, node, edge, attached, attached_of_unknown)

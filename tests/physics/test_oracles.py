@@ -12,10 +12,12 @@ from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hess
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.engine.linear.band import backward_band, eliminate_band, factor_band, forward_band, width
+from bilayer_core.engine.linear.wide_border import column_times, eliminate_wide, subtract_column
 from bilayer_core.kinematics.frames import transport_directors
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
 from bilayer_core.kinematics.vector import angle
 from bilayer_core.model.build_model import build_model
+from bilayer_core.model.sizes import ROWS_OF_BLOCK
 from bilayer_core.model.state import initial_state
 from bilayer_core.scene.loader import load_scene
 
@@ -119,7 +121,7 @@ def test_band_solver_agrees_with_a_dense_one(half_bandwidth):
     assert factor_band(indefinite, n, b, False) == 41
 
 
-@pytest.mark.parametrize("gap", [0, 1, 7, 8, 9, 30])
+@pytest.mark.parametrize("gap", [0, 1, 7, 8, 9, 30, 56, 70])
 def test_a_border_whose_columns_have_gaps_is_eliminated_like_a_dense_one(gap):
     rng = np.random.default_rng(5)
     b, strand = 4, 6
@@ -139,8 +141,19 @@ def test_a_border_whose_columns_have_gaps_is_eliminated_like_a_dense_one(gap):
             columns[a, block[a % strand]] = rng.standard_normal()
     right, corner = columns[:, :n].copy(), np.eye(m)
     assert factor_band(band, n, b, False) == -1
-    eliminate_band(band, n, b, m, columns, np.ones((m, n + b)), corner, np.zeros(n + 1, dtype=np.int64))
-    assert corner == pytest.approx(np.eye(m) - right @ np.linalg.solve(dense, right.T), rel=1e-12, abs=1e-14)
+    same, wide_corner, scaled = columns.copy(), corner.copy(), np.ones((2, m, n + b))
+    eliminate_band(band, n, b, m, columns, scaled[0], corner, np.zeros(n + 1, dtype=np.int64))
+    expected = np.eye(m) - right @ np.linalg.solve(dense, right.T)
+    assert corner == pytest.approx(expected, rel=1e-12, abs=1e-14)
+    filled = np.add.reduceat(same != 0.0, np.arange(0, n + b, ROWS_OF_BLOCK), axis=1) > 0
+    eliminate_wide(band, n, b, m, same, scaled[1], wide_corner, np.zeros(n + 1, dtype=np.int64), filled)
+    assert wide_corner == pytest.approx(expected, rel=1e-12, abs=1e-14)
+    vector = rng.standard_normal(n)
+    for a in range(m):
+        assert column_times(scaled[1], filled, a, n, vector) == pytest.approx(scaled[0, a, :n] @ vector, abs=1e-14)
+        left = vector.copy()
+        subtract_column(same, filled, a, n, 0.5, left)
+        assert left == pytest.approx(vector - 0.5 * columns[a, :n], abs=1e-14)
 
 
 @pytest.mark.parametrize("shift", [0.5, -2.0, -7.0])

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from support.evaluations import GRADIENT_LIMIT, HESSIAN_LIMIT, Problem
-from support.sample_scenes import GEL, contact, fixed, layer, rod, scene
+from support.sample_scenes import GEL, GROUND, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
+from bilayer_core.contact.facet import BORDERS
 from bilayer_core.contact.rod_bound import FAR
 from bilayer_core.contact.step_bound import KEPT_FRACTION
 from bilayer_core.testing.gaps import GapCheck
@@ -39,7 +40,7 @@ def test_derivatives_of_contact_of_unlike_layers_are_those_of_steps(dimension, h
         content, np.random.default_rng(2), "laminate", dimension, h=1e-5, noise=3e-5, origin_noise=1e-6, turns=2e-3
     )
     evaluator, free, scale = problem.evaluator, problem.free, problem.scale
-    assert np.abs(problem.model.rails.height).max() > 0.4e-3
+    assert np.abs(problem.model.rails.arm[:, 0]).max() > 0.4e-3
     terms = evaluator.evaluate(problem.at, second=True)
     assert all(terms[term] > 0.0 for term in ("rod barrier", "rod friction"))
     contacts = evaluator.problem.rod_contact.contacts
@@ -91,21 +92,44 @@ def test_contact_of_unlike_layers_exerts_no_net_force_and_no_moment():
         assert np.abs(moment).max() < 1e-13 * scale * 0.02
 
 
-def rails(problem, at):
-    """Middles between the faces of the rods at a configuration, shape (n_node, 3)."""
-    edges, position = problem.model.surfaces.node_edges, at.position
-    offset = np.concatenate([strand.offset for strand in problem.model.strands])
-    return position + offset[:, None] * at.director1[edges].mean(axis=1)
+def borders(problem, at):
+    """Middles between the faces of the rods at their left and right borders, two arrays of shape (n_node, 3)."""
+    edges, strands = problem.model.surfaces.node_edges, problem.model.strands
+    offset, thickness, width = (
+        np.concatenate([getattr(s, name) for s in strands]) for name in ("offset", "thickness", "width")
+    )
+    middle = at.position + offset[:, None] * at.director1[edges].mean(axis=1)
+    aside = 0.5 * (width - thickness)[:, None] * at.director2[edges].mean(axis=1)
+    return middle - aside, middle + aside
+
+
+def between(a, b, fraction):
+    return a + fraction[..., None] * (b - a)
+
+
+def fraction_on(a, b, p):
+    along = b - a
+    return np.clip(((p - a) * along).sum(axis=-1) / (along * along).sum(axis=-1), 0.0, 1.0)
 
 
 def gaps(problem, at):
-    """Of all points of each rod from all segments of the others [m]."""
-    search, place, edge_node = problem.model.rod_search, rails(problem, at), problem.model.rods.edge_node
-    i, s = edge_node[search.point_edge], search.point_fraction[:, None]
-    points = (1.0 - s) * place[i] + s * place[i + 1]
-    along, between = place[edge_node + 1] - place[edge_node], points[:, None] - place[edge_node]
-    t = np.clip((between * along).sum(axis=2) / (along**2).sum(axis=1), 0.0, 1.0)
-    distance = np.linalg.norm(between - t[..., None] * along, axis=2)
+    """Of all points of each rod from all facets of the others, or from their borders if points see these alone [m]."""
+    search, (left, right) = problem.model.rod_search, borders(problem, at)
+    j = problem.model.rods.edge_node
+    i, s, v = j[search.point_edge], search.point_fraction, search.point_across
+    points = between(between(left[i], left[i + 1], s), between(right[i], right[i + 1], s), v)[:, None]
+    first, last, other_first, other_last = left[j], left[j + 1], right[j], right[j + 1]
+    v = np.full((len(points), len(j)), 0.5)
+    for _ in range(60):
+        t = fraction_on(between(first, other_first, v), between(last, other_last, v), points)
+        v = fraction_on(between(first, last, t), between(other_first, other_last, t), points)
+    place = between(between(first, last, t), between(other_first, other_last, t), v)
+    distance = np.linalg.norm(points - place, axis=2)
+    beside = [
+        np.linalg.norm(points - between(a, b, fraction_on(a, b, points)), axis=2)
+        for a, b in ((first, last), (other_first, other_last))
+    ]
+    distance = np.where(search.point_sees[:, None] == BORDERS, np.minimum(*beside), distance)
     other = search.edge_rod[search.point_edge][:, None] != search.edge_rod
     return (distance - search.edge_radius[search.point_edge][:, None] - search.edge_radius)[other]
 
@@ -157,3 +181,25 @@ def test_strips_of_unlike_layers_rest_on_each_other_with_their_faces(model):
     simulator.run(0.3)
     judge = GapCheck(simulator.model)
     assert judge.smallest(judge.moment(simulator.frame())) == pytest.approx(d_hat, rel=0.02)
+
+
+def test_ribbons_pushed_against_each_other_on_the_ground_stop_edge_to_edge():
+    width, thickness, d_hat, strips = 0.01, 2e-3, 2e-4, []
+    for name, start in (("held", 0.0), ("pushed", width + 3.0 * d_hat)):
+        path = (0, start, 0.5 * thickness + 0.9 * d_hat)
+        strips.append(rod([layer(thickness=thickness)], length=0.02, stations=5, start=path, name=name, width=width))
+    strips[0] |= {"clamp_start": "wall"}
+    content = scene(
+        strips,
+        bodies=[fixed()],
+        obstacles=[GROUND],
+        contact={"barrier_distance": d_hat, "stiffness": 1e7},
+        gravity=[0, -1, -9.81],
+        damping={"mass": 50.0},
+        solver={"model": "laminate", "integrator": "sdirk2", "dt": 2e-3},
+    )
+    simulator = Simulator(load_scene(content))
+    simulator.run(0.5)
+    apart = simulator.positions[5:10, 1] - simulator.positions[:5, 1]
+    assert apart == pytest.approx(np.full(5, width + d_hat), abs=0.03 * d_hat)
+    assert np.abs(simulator.frame().directors[:, 2] - 1.0).max() < 1e-4

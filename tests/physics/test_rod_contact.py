@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support.evaluations import Problem
-from support.meeting_rods import CASES, D_HAT, Rods, model_of, parallel_rods
+from support.meeting_rods import CASES, D_HAT, WIDTH, Rods, model_of, parallel_rods
 from support.records_by_hand import changed
 from support.sample_scenes import contact, layer, rod, scene
 from support.slips import dissipation
@@ -138,7 +138,7 @@ def pressed(hub):
     motion = {"type": "prescribed"} if hub == "prescribed" else {"type": "free", "mass": 1e-3, "inertia": [2e-8] * 3}
     bodies = [{"name": "hub", "position": [0, 0, 0], "motion": motion}]
     law = {**contact(coefficient=0.4, speed_threshold=0.1), "rods": True}
-    return scene([arms, under, held], bodies=bodies, contact=law)
+    return scene([{**each, "width": WIDTH} for each in (arms, under, held)], bodies=bodies, contact=law)
 
 
 def without_elasticity(model):

@@ -10,6 +10,9 @@ from bilayer_core.model.build_model import build_model
 D_HAT = 1e-3
 
 
+WIDTH = 2e-3  # of rods that count as round
+
+
 def turned(rod_dict, direction, normal=(0, 0, 1)):
     """The rod along another direction."""
     rod_dict["path"]["direction"], rod_dict["normal"] = list(direction), list(normal)
@@ -17,6 +20,8 @@ def turned(rod_dict, direction, normal=(0, 0, 1)):
 
 
 def model_of(rods, **more):
+    """The model of rods that are as wide as round ones may be."""
+    rods = [{**each, "width": WIDTH} for each in rods]
     return build_model(load_scene(scene(rods, contact={**contact(coefficient=0.4), "rods": True}, **more)))
 
 

@@ -72,7 +72,7 @@ def test_warnings_of_many_rods_are_a_line_for_each_kind():
 
 def test_pairs_of_rods_in_contact_are_told_by_kind_with_a_count():
     pairs = make_plan(load_scene(many(rods=True))).contact_pairs
-    ribbons = "(round the curves of their nodes, without borders of ribbons)"
+    ribbons = "(as flat ribbons with borders)"
     stone = "rods – stone (points all over ribbons against box)"
     assert pairs == (
         stone,

@@ -6,6 +6,7 @@ from bilayer_core.engine.linear.arms import stencil_jacobian, stencil_rows
 from bilayer_core.engine.linear.attachments import condense_clamp_edges, condense_clamp_edges_in_plane, condense_nodes
 from bilayer_core.engine.linear.contact_columns import condense_contacts_to_bodies
 from bilayer_core.engine.linear.dense import count_negative_dense, factor_dense, solve_dense
+from bilayer_core.engine.linear.wide_border import column_times, is_wide, subtract_column
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.called import stack_matrix
 from bilayer_core.kinematics.copying import copy
@@ -101,7 +102,7 @@ def restrict_bodies(p, shift):
 @piece(bool, Problem)
 def factor_border(p):
     """Factorise S in place; false if it is not positive definite."""
-    return factor_dense(p.bordered.schur, p.bordered.width[0])
+    return factor_dense(p.bordered.schur, p.bordered.width[0], p.bordered.begins)
 
 
 @piece(int, Problem)
@@ -127,16 +128,23 @@ def solve_bordered(p):
         for f in range(free):
             for c in range(6):
                 load[a] -= freedom[6 * f + c, a] * p.sums.body[f, c]
+    wide = is_wide(width, size)
     if bordered.coupled[0] == 1:
         for a in range(width):
+            if wide:
+                load[a] -= column_times(scaled, bordered.filled, a, size, right)
+                continue
             total = 0.0
             for j in range(size):
                 total += scaled[a, j] * right[j]
             load[a] -= total
-    solve_dense(bordered.schur, width, load)
+    solve_dense(bordered.schur, width, bordered.begins, load)
     if bordered.coupled[0] == 1:
         for a in range(width):
             part = load[a]
+            if wide:
+                subtract_column(columns, bordered.filled, a, size, part, right)
+                continue
             for j in range(size):
                 right[j] -= columns[a, j] * part
     for f in range(free):

@@ -25,7 +25,7 @@ def move_joins_to_border(p):
     """Move what is in the band twice to columns of the border, after those of bodies, and add the two up."""
     joins, bordered, band, strands = p.joins, p.bordered, p.system.band, p.strands
     count, base, bandwidth = joins.first.shape[0], bordered.width[0], strands.bandwidth
-    add_columns(bordered, count)
+    add_columns(bordered, count, False)
     for k in range(count):
         _move_row(joins.column, bordered, band, strands.size, bandwidth, base, k, joins.first[k])
         _move_row(joins.column, bordered, band, strands.size, bandwidth, base, k, joins.copy[k])

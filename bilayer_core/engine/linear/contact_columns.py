@@ -7,9 +7,10 @@ the band. What moves either *side* are the unknowns of the two nodes of its edge
 
     ∂rᵀ M ∂r − κ (|e| ∂t)ᵀ (|e| ∂t),    ∂r = Σ w_m ∂y_m,    |e| ∂t = Σ a_m·∂y_m
 
-of the four ends y_m. The blocks of either side by itself stay in the band, as does the curvature of arms. For those
-between the two, the columns of the unknowns of one of them are moved to the border, as those of nodes that a free body
-holds are (`engine.linear.attachments`): with S these unknowns and R all others,
+of the four ends y_m, or eight of ribbons, and of these likewise across the width. The blocks of either side by itself
+stay in the band, as does the curvature of arms. For those between the two, the columns of the unknowns of one of them
+are moved to the border, as those of nodes that a free body holds are (`engine.linear.attachments`): with S these
+unknowns and R all others,
 
     [ A_RR  A_RS ]        band: A_RR, rows of the identity for S
     [ A_SR  A_SS ]        border: U = A_RS,   corner: D = A_SS
@@ -21,13 +22,19 @@ the border anyhow (`engine.linear.closed_rods`).
 
 from __future__ import annotations
 
+from bilayer_core.contact.rails import has_arm
 from bilayer_core.engine.linear.assembly import hold_unknowns
 from bilayer_core.engine.linear.attachments import arm_jacobian
-from bilayer_core.engine.linear.new_columns import add_columns
+from bilayer_core.engine.linear.new_columns import add_columns, add_to_column
 from bilayer_core.jit import kernel, piece
-from bilayer_core.jit.called import stack_matrix
+from bilayer_core.jit.called import stack_matrix, stack_vector
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
+
+MOST_SWEEPS = 4
+"""In which columns are chosen."""
+MOST_OF_SIDE = 15
+"""Unknowns that move a side: of four nodes and three edges."""
 
 
 @piece(int, Problem, int)
@@ -58,7 +65,8 @@ def _list_contacts(columns, rails, rate, strands, simplified, contacts):
     for c in range(contacts.count[0]):
         e, tangential = begin + c, contacts.tangential_stiffness[c]
         columns.node[e, 0], columns.node[e, 1] = contacts.node[c, 0], contacts.node[c, 1]
-        columns.stiffness[e] = tangential if contacts.inner[c] and simplified < 2 else 0.0
+        turns = contacts.inner[c] or contacts.right[c, 1] >= 0
+        columns.stiffness[e] = tangential if turns and simplified < 2 else 0.0
         for m in range(3):
             for n in range(3):
                 matrix[m, n] = contacts.matrix[c, m, n]
@@ -114,7 +122,8 @@ def _list_rails(columns, rails, rate, strands, contacts, c, e, side):
     turns = begin + 4 * dimension
     own, before = rails.node_edges[first, 1], rails.node_edges[first, 0]
     after = rails.node_edges[first + 1, 1]
-    raised = rails.height[first] != 0.0 or rails.height[first + 1] != 0.0
+    right = contacts.right[c, side]
+    raised = right >= 0 or has_arm(rails, first) or has_arm(rails, first + 1)
     for k in range(4):
         row = strands.row[first + k - 1] if 0 < k < 3 else -1
         if k == 0 and raised and before != own:
@@ -129,26 +138,70 @@ def _list_rails(columns, rails, rate, strands, contacts, c, e, side):
         columns.unknown[e, turns + 2] = strands.edge_unknown[after] if raised and after != own else -1
     for a in range(begin, begin + columns.unknown.shape[1] // 2):
         columns.rate[e, 0, a] = columns.rate[e, 1, a] = columns.rate[e, 2, a] = columns.foot[e, a] = 0.0
+        if columns.cross.shape[1] > 0:
+            columns.cross[e, a] = 0.0
+    node, edges = stack_vector(3), stack_vector(8)
+    rows = 5 if columns.cross.shape[1] > 0 else 4
     for m in range(2):
-        leg, node = 2 * side + m, first + m
-        weight, foot = contacts.weight[c, leg], contacts.foot_gradient
-        for x in range(dimension):
-            for n in range(3):
-                back = front = 0.0
-                if rails.height[node] != 0.0:
-                    for d in range(3):
-                        back += rate[node, n, d] * axes[x, d]
-                        front += rate[node, n, 4 + d] * axes[x, d]
-                for k in range(3):
-                    moved = -back if k == 0 else front if k == 2 else axes[x, n] + back - front
-                    a = begin + dimension * (m + k) + x
-                    columns.rate[e, n, a] += weight * moved
-                    columns.foot[e, a] += foot[c, leg, n] * moved
-        if dimension == 3 and rails.height[node] != 0.0:
-            for k in range(2):
-                for n in range(3):
-                    columns.rate[e, n, turns + m + k] += weight * rate[node, n, 3 + 4 * k]
-                    columns.foot[e, turns + m + k] += foot[c, leg, n] * rate[node, n, 3 + 4 * k]
+        for n in range(rows if columns.stiffness[e] != 0.0 else 3):
+            other = right + m if right >= 0 else -1
+            _gather_end(contacts, rails, rate, c, 2 * side + m, first + m, other, n, node, edges)
+            _add_row(columns, e, n, begin + dimension * m, turns + m, axes, node, edges)
+
+
+@kernel
+def _gather_end(contacts, rails, rate, c, leg, left, right, n, node_out, edges_out):
+    """Write what the rails of one end contribute to row n of what moves: by their node, and by the edges beside it."""
+    for k in range(8):
+        edges_out[k] = 0.0
+    for x in range(3):
+        node_out[x] = 0.0
+    for border in range(1 if right < 0 else 2):
+        r, w = (left, leg) if border == 0 else (right, 4 + leg)
+        turns = has_arm(rails, r)
+        for x in range(3):
+            if n < 3:
+                value = contacts.weight[c, w] if x == n else 0.0
+            elif n == 3:
+                value = contacts.foot_gradient[c, w, x]
+            else:
+                value = contacts.cross_gradient[c, w, x]
+            if value != 0.0:
+                node_out[x] += value
+                if turns:
+                    for k in range(8):
+                        edges_out[k] += value * rate[r, x, k]
+
+
+@kernel
+def _add_row(columns, e, n, at, turns, axes, node, edges):
+    """Add what an end contributes to row n of what moves with unknowns: those of the nodes before, at and after it,
+    from `at` on, and the turns of the two edges between.
+    """
+    dimension = axes.shape[0]
+    for x in range(dimension):
+        own, back, front = 0.0, 0.0, 0.0
+        for d in range(3):
+            own += node[d] * axes[x, d]
+            back += edges[d] * axes[x, d]
+            front += edges[4 + d] * axes[x, d]
+        _add_value(columns, e, n, at + x, -back)
+        _add_value(columns, e, n, at + dimension + x, own + back - front)
+        _add_value(columns, e, n, at + 2 * dimension + x, front)
+    if dimension == 3:
+        _add_value(columns, e, n, turns, edges[3])
+        _add_value(columns, e, n, turns + 1, edges[7])
+
+
+@kernel
+def _add_value(columns, e, n, a, value):
+    """Add to row n, ∂r (n < 3), |e| ∂t (3) or that across (4), of what moves with an unknown."""
+    if n < 3:
+        columns.rate[e, n, a] += value
+    elif n == 3:
+        columns.foot[e, a] += value
+    else:
+        columns.cross[e, a] += value
 
 
 @kernel
@@ -156,23 +209,45 @@ def _entry(columns, c, a, b):
     """Return the entry of the second derivative of contact c by its unknowns a and b."""
     rate, pressed = columns.rate, columns.pressed
     value = rate[c, 0, a] * pressed[c, 0, b] + rate[c, 1, a] * pressed[c, 1, b] + rate[c, 2, a] * pressed[c, 2, b]
+    if columns.cross.shape[1] > 0:
+        value -= columns.stiffness[c] * columns.cross[c, a] * columns.cross[c, b]
     return value - columns.stiffness[c] * columns.foot[c, a] * columns.foot[c, b]
+
+
+@kernel
+def _write_entries(columns, c, a, begin, end, out):
+    """Write the entries of unknown a with those from `begin` to `end`: as `_entry`, several at a time."""
+    rate, pressed = columns.rate, columns.pressed
+    r0, r1, r2 = rate[c, 0, a], rate[c, 1, a], rate[c, 2, a]
+    for b in range(begin, end):
+        out[b - begin] = r0 * pressed[c, 0, b] + r1 * pressed[c, 1, b] + r2 * pressed[c, 2, b]
+    if columns.stiffness[c] == 0.0:
+        return
+    if columns.cross.shape[1] > 0:
+        part = columns.stiffness[c] * columns.cross[c, a]
+        for b in range(begin, end):
+            out[b - begin] -= part * columns.cross[c, b]
+    part = columns.stiffness[c] * columns.foot[c, a]
+    for b in range(begin, end):
+        out[b - begin] -= part * columns.foot[c, b]
 
 
 @kernel
 def _add_own_sides(columns, band):
     """Add the blocks of either side of each contact by itself to the band."""
-    half = columns.unknown.shape[1] // 2
+    half, entries = columns.unknown.shape[1] // 2, stack_vector(MOST_OF_SIDE)
     for c in range(columns.contacts):
         for side in range(2):
-            for a in range(side * half, (side + 1) * half):
+            begin = side * half
+            for a in range(begin, begin + half):
                 row = columns.unknown[c, a]
                 if row < 0:
                     continue
-                for b in range(side * half, a + 1):
+                _write_entries(columns, c, a, begin, a + 1, entries)
+                for b in range(begin, a + 1):
                     column = columns.unknown[c, b]
                     if column >= 0:
-                        band[min(row, column), abs(row - column)] += _entry(columns, c, a, b)
+                        band[min(row, column), abs(row - column)] += entries[b - begin]
 
 
 @kernel
@@ -181,7 +256,7 @@ def _add_curvature(rails, strands, band):
     axes, dimension, block = strands.axes, strands.axes.shape[0], rails.curvature
     for e in range(block.shape[0]):
         i = strands.edge_node[e]
-        if rails.height[i] == 0.0 and rails.height[i + 1] == 0.0:
+        if rails.right[e] < 0 and not has_arm(rails, i) and not has_arm(rails, i + 1):
             continue
         first, last = strands.row[i], strands.row[i + 1]
         for x in range(dimension):
@@ -205,18 +280,40 @@ def _add_curvature(rails, strands, band):
 
 @kernel
 def _choose_unknowns(columns):
-    """Give contact columns to the smaller set of unknowns of each two strands in contact (or halves of one)."""
-    count, node, strand, mark, met = columns.contacts, columns.node, columns.strand, columns.mark, columns.met
-    half = columns.unknown.shape[1] // 2
-    mark[:] = -1
+    """Give contact columns to the smaller set of unknowns of each two strands in contact (or halves of one), of those
+    that have none for other strands. The choice is made again with what all others have chosen.
+    """
+    mark, met = columns.mark, columns.met
+    mark[:, :2] = -1
+    mark[:, 2] = 0
     met[:] = 0
-    columns.column[:] = -1
+    for sweep in range(MOST_SWEEPS):
+        if not _choose_once(columns, sweep * columns.contacts):
+            break
+    chosen = 0
+    for i in range(mark.shape[0]):
+        columns.column[i] = -1
+        if mark[i, 2] > 0:
+            columns.column[i] = chosen
+            columns.row[chosen] = i
+            chosen += 1
+    columns.unknowns = chosen
+
+
+@kernel
+def _choose_once(columns, first_stamp):
+    """Choose one side of each two strands; return whether any choice changes.
+
+    How many have chosen an unknown is left in `mark`, and in `met` the first contact of two strands with their side.
+    """
+    count, node, strand, mark, met = columns.contacts, columns.node, columns.strand, columns.mark, columns.met
+    half, changes = columns.unknown.shape[1] // 2, False
     for c in range(count):
         first, second = min(node[c, 0], node[c, 1]), max(node[c, 0], node[c, 1])
-        s, t = strand[first], strand[second]
-        if met[s, t] == 1:
+        s, t, stamp = strand[first], strand[second], first_stamp + c
+        before = met[s, t]
+        if before > 0 and (before - 1) // 2 != c:
             continue
-        met[s, t] = 1
         lower = upper = 0
         for e in range(c, count):
             low, high = min(node[e, 0], node[e, 1]), max(node[e, 0], node[e, 1])
@@ -225,19 +322,21 @@ def _choose_unknowns(columns):
             low_side = 0 if node[e, 0] <= node[e, 1] else 1
             if not (_has_free(columns, e, 0, half) and _has_free(columns, e, half, 2 * half)):
                 continue
-            lower += _mark_side(columns, e, low_side * half, half, 0, c)
-            upper += _mark_side(columns, e, (1 - low_side) * half, half, 1, c)
+            lower += _mark_side(columns, e, low_side * half, half, 0, stamp)
+            upper += _mark_side(columns, e, (1 - low_side) * half, half, 1, stamp)
+        for i in range(mark.shape[0]):
+            if before > 0 and mark[i, (before - 1) % 2] == stamp:
+                mark[i, 2] -= 1
+            if mark[i, 2] > 0:
+                lower -= mark[i, 0] == stamp
+                upper -= mark[i, 1] == stamp
         fewer = 0 if lower <= upper else 1
         for i in range(mark.shape[0]):
-            if mark[i, fewer] == c:
-                mark[i, 2] = 1
-    chosen = 0
-    for i in range(mark.shape[0]):
-        if mark[i, 2] == 1:
-            columns.column[i] = chosen
-            columns.row[chosen] = i
-            chosen += 1
-    columns.unknowns = chosen
+            if mark[i, fewer] == stamp:
+                mark[i, 2] += 1
+        met[s, t] = 1 + 2 * c + fewer
+        changes = changes or met[s, t] != before
+    return changes
 
 
 @kernel
@@ -256,13 +355,13 @@ def _has_free(columns, e, begin, end):
 
 
 @kernel
-def _mark_side(columns, e, begin, half, which, c):
-    """Mark the free unknowns of a side with c; return how many were not."""
+def _mark_side(columns, e, begin, half, which, stamp):
+    """Mark the free unknowns of a side; return how many were not."""
     mark, new = columns.mark, 0
     for a in range(begin, begin + half):
         row = columns.unknown[e, a]
-        if _is_free(columns, row) and mark[row, which] != c:
-            mark[row, which] = c
+        if _is_free(columns, row) and mark[row, which] != stamp:
+            mark[row, which] = stamp
             new += 1
     return new
 
@@ -319,7 +418,7 @@ def move_to_border(p):
     if base + count > bordered.load.shape[0]:
         bordered.width[0] = base + count
         return False
-    add_columns(bordered, count)
+    add_columns(bordered, count, True)
     _move_from_band(columns, bordered, strands, base, p.system.band)
     _add_between(columns, p.joins, p.bodies.freedom, bordered, base)
     return True
@@ -339,8 +438,8 @@ def _move_from_band(columns, bordered, strands, base, band):
             value = band[column, i - column] if i >= column else band[i, column - i]
             if slot[i] >= 0:
                 corner[base + slot[i], own] = value
-            else:
-                border[own, i] = value
+            elif value != 0.0:
+                add_to_column(bordered, own, i, value)
     hold_unknowns(columns.row[:count], 1, bandwidth, band)
 
 
@@ -356,24 +455,31 @@ def _column(columns, joins, freedom, base, row):
 def _add_between(columns, joins, freedom, bordered, base):
     """Add the blocks between the sides of contacts, of nodes that no body holds; one side of each has columns."""
     attached, half = columns.attached, columns.unknown.shape[1] // 2
+    entries = stack_vector(MOST_OF_SIDE)
     for c in range(columns.contacts):
+        begin = half  # of the side with columns: values of one are next to each other
         for a in range(half):
+            row = columns.unknown[c, a]
+            if row >= 0 and attached[row] < 0 and columns.column[row] >= 0:
+                begin = 0
+        for a in range(begin, begin + half):
             row = columns.unknown[c, a]
             if row < 0 or attached[row] >= 0:
                 continue
             own = _column(columns, joins, freedom, base, row)
-            for b in range(half, 2 * half):
+            _write_entries(columns, c, a, half - begin, 2 * half - begin, entries)
+            for b in range(half - begin, 2 * half - begin):
                 column = columns.unknown[c, b]
                 if column < 0 or attached[column] >= 0:
                     continue
-                other, value = _column(columns, joins, freedom, base, column), _entry(columns, c, a, b)
+                other, value = _column(columns, joins, freedom, base, column), entries[b - half + begin]
                 if own >= 0 and other >= 0:
                     bordered.schur[own, other] += value
                     bordered.schur[other, own] += value
                 elif own >= 0:
-                    bordered.border[own, column] += value
+                    add_to_column(bordered, own, column, value)
                 else:
-                    bordered.border[other, row] += value
+                    add_to_column(bordered, other, row, value)
 
 
 @kernel

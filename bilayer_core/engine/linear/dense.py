@@ -8,37 +8,47 @@ from __future__ import annotations
 
 import math
 
+from bilayer_core.engine.linear.wide_border import MANY
 from bilayer_core.jit import kernel
 
 
 @kernel
-def factor_dense(matrix, n):
+def factor_dense(matrix, n, begins_out):
     """Factorise the first n rows and columns of a symmetric matrix in place; false if they are not positive
     definite.
 
     Four rows are made together, so that those before are read a quarter as often: of a few hundred rows they would not
-    stay in the nearest cache.
+    stay in the nearest cache. Where there are many, zeros at the beginnings of rows, which stay zero, are left out;
+    their numbers are left in `begins_out`.
     """
     for first in range(0, n, 4):
         last = min(first + 4, n)
         begin = 0
+        for i in range(first, last):
+            begins_out[i] = 0
+            while n >= MANY and begins_out[i] < i and matrix[i, begins_out[i]] == 0.0:
+                begins_out[i] += 1
         if last == first + 4:
             begin = first
-            for j in range(first):
+            left = min(min(begins_out[first], begins_out[first + 1]), min(begins_out[first + 2], begins_out[first + 3]))
+            for j in range(left, first):
                 t0, t1, t2, t3 = matrix[first, j], matrix[first + 1, j], matrix[first + 2, j], matrix[first + 3, j]
-                for k in range(j):
-                    value = matrix[j, k]
-                    t0 -= matrix[first, k] * value
-                    t1 -= matrix[first + 1, k] * value
-                    t2 -= matrix[first + 2, k] * value
-                    t3 -= matrix[first + 3, k] * value
+                both = max(left, begins_out[j])
+                row0, row1, row2 = matrix[first, both:j], matrix[first + 1, both:j], matrix[first + 2, both:j]
+                row3, other = matrix[first + 3, both:j], matrix[j, both:j]
+                for k in range(other.shape[0]):
+                    value = other[k]
+                    t0 -= row0[k] * value
+                    t1 -= row1[k] * value
+                    t2 -= row2[k] * value
+                    t3 -= row3[k] * value
                 pivot = matrix[j, j]
                 matrix[first, j], matrix[first + 1, j] = t0 / pivot, t1 / pivot
                 matrix[first + 2, j], matrix[first + 3, j] = t2 / pivot, t3 / pivot
         for i in range(first, last):
-            for j in range(begin, i + 1):
+            for j in range(max(begin, begins_out[i]), i + 1):
                 total = matrix[i, j]
-                for k in range(j):
+                for k in range(max(begins_out[i], begins_out[j]), j):
                     total -= matrix[i, k] * matrix[j, k]
                 if j < i:
                     matrix[i, j] = total / matrix[j, j]
@@ -50,16 +60,16 @@ def factor_dense(matrix, n):
 
 
 @kernel
-def solve_dense(factor, n, right):
+def solve_dense(factor, n, begins, right):
     """Overwrite the first n values of a vector with the solution of the factorised system."""
     for i in range(n):
         total = right[i]
-        for k in range(i):
+        for k in range(begins[i], i):
             total -= factor[i, k] * right[k]
         right[i] = total / factor[i, i]
     for i in range(n - 1, -1, -1):
         right[i] /= factor[i, i]
-        for k in range(i):
+        for k in range(begins[i], i):
             right[k] -= factor[i, k] * right[i]
 
 

@@ -7,6 +7,7 @@ registers: for 200 nodes in space two to three times as fast as one set for all 
 from __future__ import annotations
 
 from bilayer_core.engine.linear.band import backward_band, eliminate_band, factor_band, forward_band, width
+from bilayer_core.engine.linear.wide_border import eliminate_wide, is_wide
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.piece import Piece
 from bilayer_core.jit.record import Matrix, Vector
@@ -22,7 +23,13 @@ def _declare(function, suffix: str, *arguments) -> Piece:
 @kernel
 def _eliminate(band, n, half_bandwidth, bordered):
     columns, scaled, corner, present = bordered.border, bordered.scaled, bordered.schur, bordered.present
-    eliminate_band(band, n, half_bandwidth, bordered.width[0], columns, scaled, corner, present)
+    m = bordered.width[0]
+    if is_wide(m, n):
+        eliminate_wide(band, n, half_bandwidth, m, columns, scaled, corner, present, bordered.filled)
+        bordered.noted[0] = max(bordered.noted[0], m)
+    else:
+        bordered.noted[0] = 0
+        eliminate_band(band, n, half_bandwidth, m, columns, scaled, corner, present)
 
 
 def _of_width(half_bandwidth: int) -> tuple[Piece, ...]:
@@ -64,6 +71,7 @@ factor_9, forward_9, backward_9, eliminate_9 = SETS[9] = _of_width(9)
 factor_10, forward_10, backward_10, eliminate_10 = SETS[10] = _of_width(10)
 factor_14, forward_14, backward_14, eliminate_14 = SETS[14] = _of_width(14)
 factor_18, forward_18, backward_18, eliminate_18 = SETS[18] = _of_width(18)
+factor_26, forward_26, backward_26, eliminate_26 = SETS[26] = _of_width(26)
 
 
 @kernel
@@ -82,6 +90,8 @@ def factorise_band(band, n, counts):
         return factor_14(band, n, counts)
     if b == 18:
         return factor_18(band, n, counts)
+    if b == 26:
+        return factor_26(band, n, counts)
     return 0  # no width of a model: as if the first pivot were not positive
 
 
@@ -99,7 +109,9 @@ def go_forward(band, n, right):
         return forward_10(band, n, right)
     if b == 14:
         return forward_14(band, n, right)
-    return forward_18(band, n, right)
+    if b == 18:
+        return forward_18(band, n, right)
+    return forward_26(band, n, right)
 
 
 @kernel
@@ -116,7 +128,9 @@ def go_backward(band, n, right):
         return backward_10(band, n, right)
     if b == 14:
         return backward_14(band, n, right)
-    return backward_18(band, n, right)
+    if b == 18:
+        return backward_18(band, n, right)
+    return backward_26(band, n, right)
 
 
 @kernel
@@ -133,4 +147,6 @@ def eliminate(band, n, bordered):
         return eliminate_10(band, n, bordered)
     if b == 14:
         return eliminate_14(band, n, bordered)
-    return eliminate_18(band, n, bordered)
+    if b == 18:
+        return eliminate_18(band, n, bordered)
+    return eliminate_26(band, n, bordered)

@@ -151,33 +151,39 @@ class RodContactList:
     gap: Vector = ("contact",)  # d [m]
     distance: Vector = ("contact",)  # D [m]
     node: IndexTable = ("contact", 2)  # i and j
-    weight: Matrix = ("contact", 4)  # w_m
+    right: IndexTable = ("contact", 2)  # rails of their right borders, −1 of round rods
+    weight: Matrix = ("contact", "leg")  # w_m, of right borders last
     normal: Matrix = ("contact", 3)  # n
     normal_force: Vector = ("contact",)  # λ [N]; those of friction alone
     matrix: Stack = ("contact", 3, 3)  # M [N/m]
     tangential_stiffness: Vector = ("contact",)  # κ [N/m]
     segment_direction: Matrix = ("contact", 3)  # u
-    foot_gradient: Stack = ("contact", 4, 3)  # a_m
+    foot_gradient: Stack = ("contact", "leg", 3)  # a_m
+    cross_gradient: Stack = ("contact", "ribbon leg", 3)  # and across the width
+    place: Matrix = ("contact", 2)  # t and v of the nearest place
 
 
 @record
 class Rails:
     """Middles between the faces of rods off their curves, and how they move; see `contact.rails`."""
 
-    height: Vector  # over the nodes [m], shape (n_node,)
+    node: Indices  # of each rail: all nodes, then those of ribbons once more for their right borders, shape (n_rail,)
+    arm: Matrix  # along m1 and m2 [m], shape (n_rail, 2)
+    right: Indices  # rail of the right border at the first node of each edge, −1 of round ones, shape (n_edge,)
     node_edges: IndexTable  # before and after each node, the same at an end, shape (n_node, 2)
     factor: float  # how many times farther than nodes, and borders of edges by a turn, rails move at most
-    place: Matrix = ("node", 3)  # [m]
-    rate: Stack = ("node", 3, 8)  # by the edges at each node, see `forces.rail_arms`
-    gradient: Matrix = ("node", 3)  # of the barrier at the contacts found last [N]
+    place: Matrix = ("rail", 3)  # [m]
+    rate: Stack = ("rail", 3, 8)  # by the edges at each node, see `forces.rail_arms`
+    gradient: Matrix = ("rail", 3)  # of the barrier at the contacts found last [N]
     curvature: Stack = ("edge", 4, 4)  # what its second derivative has of arms
-    slip_rate: Stack = ("node", 3, 8)  # rates frozen for friction
-    drag: Matrix = ("node", 3)  # gradient of friction [N]
-    slip: Matrix = ("node", 3)  # since the origin of a stage [m]
+    slip_rate: Stack = ("rail", 3, 8)  # rates frozen for friction
+    drag: Matrix = ("rail", 3)  # gradient of friction [N]
+    slip: Matrix = ("rail", 3)  # since the origin of a stage [m]
     node_motion: Matrix = ("node", 3)  # scratch
+    motion: Matrix = ("rail", 3)  # scratch
     turn: Vector = ("edge",)  # scratch
-    swing: Vector = ("node",)  # in a step beyond the motion of their nodes, at most [m]
-    step: Matrix = ("node", 3)  # mean motion in a step [m]
+    swing: Vector = ("rail",)  # in a step beyond the motion of their nodes, at most [m]
+    step: Matrix = ("rail", 3)  # mean motion in a step [m]
 
 
 @record
@@ -193,9 +199,9 @@ class RodContact:
     point_weight: Vector
     rails: Rails
     search: RodSearch
-    last: Matrix = ("node", 3)  # where rails were last, their mean taken off [m]
+    last: Matrix = ("rail", 3)  # where rails were last, their mean taken off [m]
     ways: Vector  # of the list; see `contact.rod_list`, shape (4,)
-    no_step: Matrix = ("node", 3)  # zeros
+    no_step: Matrix = ("rail", 3)  # zeros
     gap: Vector = (1,)  # the smallest below the barrier distance
     contacts: RodContactList  # present ones
     sliding: RodContactList  # of the start of the stage
@@ -213,10 +219,11 @@ class ContactColumns:
     pressed: Stack = ("contact", 3, "sides")  # M ∂r
     stiffness: Vector = ("contact",)  # κ, 0 where the nearest point is a node
     foot: Matrix = ("contact", "sides")  # |e| ∂t
+    cross: Matrix = ("contact", "ribbon sides")  # likewise across the width
     strand: Indices  # of each node
     attached: Indices  # index among held nodes of each unknown, which are in the border already, or −1
     joined: Flags  # whether an unknown is in the border because a rod closes there
-    mark: IndexTable = ("matrix unknown", 3)  # scratch
+    mark: IndexTable = ("matrix unknown", 3)  # scratch: of contacts on either side, and how often it is chosen
     met: IndexTable = ("strand", "strand")  # scratch
     row: Indices = ("matrix unknown",)  # in the band, of each unknown that has a column, ascending
     column: Indices = ("matrix unknown",)  # of each unknown among the contact columns, −1 without one

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bilayer_core.jit.record import CHANGES, Flags, Indices, Matrix, Stack, Vector, record
+from bilayer_core.jit.record import CHANGES, Flags, FlagTable, Indices, Matrix, Stack, Vector, record
 from bilayer_core.model.records.contacts import ContactColumns, Restitution, RodContact, Sliding, Slips, Surfaces
 from bilayer_core.model.records.light import Light
 from bilayer_core.model.records.parts import (
@@ -99,8 +99,14 @@ class BorderedSystem:
     border: Matrix = ("column", "row")  # U by columns, then L⁻¹ U
     scaled: Matrix = ("column", "row")  # D⁻¹ L⁻¹ U likewise
     schur: Matrix = ("column", "column")
+    begins: Indices = ("column",)  # of rows of its factor: column of the first value that is not zero
     load: Vector = ("column",)
     present: Indices = ("row",)  # scratch: from and to which row a column is not zero
+    filled: FlagTable = (
+        "column",
+        "block of rows",
+    )  # whether it has values there, see `engine.linear.wide_border`
+    noted: Indices = (1,)  # of how many columns that is known
     width: Indices  # columns in use, shape (1,)
     coupled: Indices = (1,)  # whether the border is not zero
 
