@@ -6,8 +6,9 @@ scipy's k-d tree finds anew at every look; distances are computed by other formu
 
 - Surfaces are met by ribbons as they are (`testing.ribbons`), but half spaces by their stations alone, as the model has
   it; by balls, and by the corners and rims of bodies (`testing.surfaces`).
-- Rods meet rods as round ones about the middle between their faces, straight between stations. On one rod, edges count
-  that are at least as far apart along it as the model's own exclusion (`model.rod_surfaces`).
+- Rods meet rods as ribbons straight between stations, and those up to twice as wide as thick as round ones about the
+  middle between their faces. On one rod, edges count that are at least as far apart along it as the model's own
+  exclusion (`model.rod_surfaces`).
 
 The model keeps points apart, not all between them: surfaces may be nearer than it knows by `UNSURE` of the barrier
 distance, and rods, whose points are no farther apart than their radius, by √(4 + 1/4) − 2 of that where two cross.
@@ -28,6 +29,7 @@ import numpy as np
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
+from bilayer_core.model.colliders import meets_with_borders
 from bilayer_core.model.model import Model
 from bilayer_core.observed.frame import Frame
 from bilayer_core.testing.ribbons import Ribbons, Sheet
@@ -76,6 +78,11 @@ class GapCheck:
         self._points, self._ribbons = BodyPoints(model), Ribbons(model)
         self._surfaces = surfaces_of(model, self._points)
         edge = model.rods.edge_node
+        wide = {copy.name for rod in model.scene.rods if meets_with_borders(rod) for copy in rod.copies}
+        self._has_width = np.zeros(len(edge))
+        for strand in model.strands:
+            own = slice(strand.first_edge, strand.first_edge + strand.node_count - 1)
+            self._has_width[own] = strand.rod in wide
         self._meeting = [np.flatnonzero(of.nodes[edge] & of.nodes[edge + 1]) for of in self._surfaces]
         self._smallest_radius = float(self._ribbons.radius[model.node_length > 0.0].min())
         if self._pairs:
@@ -90,7 +97,7 @@ class GapCheck:
         """Leave out pairs of edges that touch at the start, of rods that one body holds side by side."""
         rods, (first, second) = self._model.rod_search, self._pairs.at(start[0])
         joined = rods.rod_joined[rods.edge_rod[first], rods.edge_rod[second]]
-        gaps, _ = self._rod_gaps(self._ribbons.sheet(start).straight(), first, second)
+        gaps, _ = self._rod_gaps(self._ribbons.sheet(start).straight(self._has_width), first, second)
         self._pairs.leave_out(start[0], joined & (gaps < self._model.scene.contact.barrier_distance))
 
     @property
@@ -116,7 +123,7 @@ class GapCheck:
         """Return the smallest gap [m]; infinite if nothing can meet."""
         sheet, gaps = self._ribbons.sheet(at.sections), [math.inf]
         if self._pairs:
-            cores = sheet.straight()
+            cores = sheet.straight(self._has_width)
             unit, (first, second) = self._model.scene.contact.barrier_distance, self._pairs.at(at.sections[0])
             bound, _ = cores.apart_at_least(first, second)
             near = bound < unit
@@ -150,7 +157,7 @@ class GapCheck:
         sheet = self._ribbons.sheet(at.sections)
         if with_rods:
             first, second = self._pairs.at(at.sections[0])
-            gaps, radii = self._rod_gaps(sheet.straight(), first, second)
+            gaps, radii = self._rod_gaps(sheet.straight(self._has_width), first, second)
             deep = np.flatnonzero(gaps < -DEEP * radii)
             if deep.size:
                 first, second = first[deep], second[deep]

@@ -108,11 +108,14 @@ class Sheet:
     points: Array
     radius: Array
 
-    def straight(self) -> Sheet:
-        """Return the sheet without its width, straight between stations: what rods meet rods with."""
+    def straight(self, has_width: Array) -> Sheet:
+        """Return the sheet straight between stations, without its width where an edge has none: what rods meet rods
+        with.
+        """
         begin, end = self.points[:, :, :1], self.points[:, :, 3:]
         straight = begin + np.linspace(0.0, 1.0, 4)[:, None] * (end - begin)
-        return Sheet(straight * np.array([1.0, 0.0])[:, None, None, None], self.radius)
+        straight[1] *= has_width[:, None, None]
+        return Sheet(straight, self.radius)
 
     def at(self, edge: Array, along: Array, across: Array) -> tuple[Array, Array]:
         """Return places [m], shape (n, 3), and half thicknesses there [m], 0 ≤ along ≤ 1."""

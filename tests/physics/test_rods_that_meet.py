@@ -6,33 +6,37 @@ from support.sample_scenes import GROUND, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import PenetrationError
+from bilayer_core.testing.gaps import GapCheck
 
 D_HAT = 1e-3
-ROUND = " (round the curves of their nodes, without borders of ribbons)"
+FLAT = " (as flat ribbons with borders)"
 
 
-def stacked(lower_stations, upper_stations):
-    """A ribbon on another one of the same length on the ground; barriers soft enough for both to stay straight."""
-    lower = rod([layer(thickness=2e-3)], stations=lower_stations, start=(0, 0, 1.9e-3), name="lower")
-    upper = rod([layer()], stations=upper_stations, start=(0, 0, 4.3e-3), name="upper")
+def stacked(lower_stations, upper_stations, width=0.01, thickness=2e-3):
+    """A rod on another one of the same length on the ground; barriers soft enough for both to stay straight."""
+    lower = rod([layer(thickness=2e-3)], stations=lower_stations, start=(0, 0, 1.9e-3), name="lower", width=width)
+    start = (0, 0, 3.8e-3 + 0.5 * thickness)
+    upper = rod([layer(thickness=thickness)], stations=upper_stations, start=start, name="upper", width=width)
     soft = contact(coefficient=0.5) | {"stiffness": 1e4}
     return scene([lower, upper], gravity=[0, 0, -10.0], obstacles=[GROUND], contact=soft, damping={"mass": 60.0})
 
 
 @pytest.mark.parametrize("stations", [(11, 12), (21, 38), (81, 55)])
-def test_parallel_ribbons_rest_at_the_gap_that_the_barrier_demands_on_any_meshes(stations):
-    simulator = Simulator(load_scene(stacked(*stations)))
+@pytest.mark.parametrize(("width", "thickness"), [(0.01, 2e-3), (2e-3, 1e-3)], ids=["ribbons", "round"])
+def test_parallel_rods_rest_at_the_gap_that_the_barrier_demands_on_any_meshes(stations, width, thickness):
+    simulator = Simulator(load_scene(stacked(*stations, width, thickness)))
     simulator.run(0.3)
     upper = simulator.model.strands[1].first_node
     heights, weights = simulator.positions[:, 2], simulator.model.node_length
     gap = np.average(heights[upper:], weights=weights[upper:])
-    gap -= np.average(heights[:upper], weights=weights[:upper]) + 1.5e-3
+    gap -= np.average(heights[:upper], weights=weights[:upper]) + 1e-3 + 0.5 * thickness
     s = gap - D_HAT
-    weight = 0.1  # N/m
+    weight = 1e4 * width * thickness  # N/m
     assert 1e4 * (2.0 * s * np.log(gap / D_HAT) + s * s / gap) == pytest.approx(weight, rel=1e-3)
     total = simulator.contact_forces
     assert total[upper:].sum(axis=0) == pytest.approx([0, 0, weight * 0.1], rel=1e-5, abs=1e-7)
-    assert total.sum(axis=0) == pytest.approx([0, 0, 3.0 * weight * 0.1], rel=1e-5, abs=1e-7)
+    both = 1e4 * width * (thickness + 2e-3) * 0.1
+    assert total.sum(axis=0) == pytest.approx([0, 0, both], rel=1e-5, abs=1e-7)
 
 
 @pytest.mark.parametrize("speed", [0.5, 20.0])
@@ -58,6 +62,26 @@ def test_a_ribbon_that_falls_across_the_middle_of_another_does_not_pass(speed):
     assert smallest < D_HAT  # they met
     # points of a rod are half a thickness apart: centrelines of two crossing ones stay this far apart
     assert lowest > np.sqrt(1e-3**2 - 0.25e-3**2)
+
+
+@pytest.mark.parametrize("speed", [0.5, 20.0])
+@pytest.mark.parametrize("direction", [(1, 0, 0), (1, 0.5, 0)], ids=["edge to edge", "corner first"])
+def test_a_ribbon_thrown_sideways_at_the_edge_of_another_does_not_pass(speed, direction):
+    held = rod([layer()], stations=6, length=0.05, start=(-0.025, 0, 0), name="held", clamp_start="wall")
+    thrown = rod([layer()], stations=6, length=0.05, start=(-0.02, 0.02, 0), name="thrown")
+    thrown["path"]["direction"] = list(direction)
+    meeting = scene(
+        [held, thrown], bodies=[fixed(position=(-0.025, 0, 0))], contact=contact(2e-4), solver={"model": "laminate"}
+    )
+    simulator = Simulator(load_scene(meeting))
+    judge, smallest = GapCheck(simulator.model), np.inf
+    simulator._state.velocity[6:, 1] = -speed
+    for _ in range(round(0.04 / speed / simulator.dt) + 20):
+        simulator.step()
+        moment = judge.moment(simulator.frame())
+        smallest = min(smallest, judge.smallest(moment))
+        assert judge.crossed(moment) == ""
+    assert -judge.unsure < smallest < 2e-4  # they met
 
 
 def curling(stations=46, **more):
@@ -153,7 +177,7 @@ def test_contact_of_rods_is_left_out_where_geometry_excludes_it_and_the_plan_say
     assert "a – b: held 79" in apart.terms["rod friction"]
     free = plan_of([rod([layer()], name="a"), rod([layer()], name="b", start=(0, 0, 1))])
     assert free.terms["rod barrier"] == free.terms["rod friction"] == "active" and free.contact_pairs == (
-        f"a – b{ROUND}",
+        f"a – b{FLAT}",
     )
     off = plan_of([rod([layer()], name="a"), rod([layer()], name="b")], contact={**contact(), "rods": False})
     assert off.terms["rod barrier"] == "skipped: contact.rods is false"
@@ -165,7 +189,7 @@ def test_contact_of_rods_is_left_out_where_geometry_excludes_it_and_the_plan_say
 def test_arms_that_a_hub_holds_side_by_side_do_not_feel_what_joins_them():
     star = rod([layer()], length=0.03, stations=16, name="arm", clamp_start="hub", pattern={"count": 12})
     simulator = Simulator(load_scene(scene([star], bodies=[fixed("hub")], contact=contact())))
-    assert simulator.plan.contact_pairs == (f"arm – its copies{ROUND}",)
+    assert simulator.plan.contact_pairs == (f"arm – its copies{FLAT}",)
     simulator.run(0.01)
     assert np.abs(simulator.contact_forces).max() == 0.0
 
