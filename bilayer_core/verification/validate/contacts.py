@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
+from bilayer_core.testing.gaps import GapCheck
 from bilayer_core.verification.validate.closed_forms import oblique_slide
 from bilayer_core.verification.validate.parts import GROUND, ball, contact, fixed, layer, rod, scene
 from bilayer_core.verification.validate.validation_case import Case
@@ -44,7 +45,10 @@ def acceleration(simulator: Simulator, settle: float = 0.05, time: float = 0.2) 
 
 
 def stacked(model: str, dimension: int) -> tuple[float, float]:
-    """Return the distance of the middles of two strips of unlike layers, one on the other on the ground [mm]."""
+    """Return the distance of the middles of two strips of unlike layers, one on the other on the ground [mm].
+
+    Without friction the upper one would slide off.
+    """
     unlike = {"paper": {"youngs_modulus": 2e9, "poisson_ratio": 0.4, "density": 1000.0}}
     layers = [layer("bottom"), layer("top", material="paper")]
     heights = {"low": 1.999e-3, "high": 4.998e-3}
@@ -53,7 +57,7 @@ def stacked(model: str, dimension: int) -> tuple[float, float]:
         strips,
         gravity=[0, 0, -GRAVITY],
         obstacles=[GROUND],
-        contact=contact(),
+        contact=contact(coefficient=0.5),
         solver={"model": model, "dimension": dimension},
     )
     config["materials"] |= unlike
@@ -65,12 +69,103 @@ def stacked(model: str, dimension: int) -> tuple[float, float]:
     return 1e3 * float(simulator.positions[last + 5, 2] - simulator.positions[first + 5, 2]), 2.0 + 1e3 * resting_gap()
 
 
-@cache
-def resting_gap() -> float:
-    """Return the gap d [m] at which the barrier carries 10 mm × 2 mm of density 1000: K_c [2(d − d̂) log(d/d̂) + (d −
-    d̂)²/d] = q.
+def side_by_side() -> tuple[float, float]:
+    """Return the distance of the middles of two strips on the ground, one pushed against the edge of the other [mm].
+
+    A border stands for a quarter of the width: of what carries a load all over, it has a quarter.
     """
-    limit, stiffness, weight = 1e-3, 1e7, 1000.0 * GRAVITY * 0.01 * 2e-3
+    strips = [rod([layer(thickness=2e-3)], 0.02, 5, (0, y, 1.99e-3), name) for name, y in (("a", 0.0), ("b", 0.0112))]
+    strips[0] |= {"clamp_start": "wall"}
+    config = scene(
+        strips,
+        gravity=[0, -GRAVITY, -GRAVITY],
+        obstacles=[GROUND],
+        bodies=[fixed(position=(0, 0, 1.99e-3))],
+        contact=contact(),
+        damping={"mass": 50.0},
+        solver={"model": "laminate", "integrator": "sdirk2", "dt": 2e-3},
+    )
+    simulator = Simulator(load_scene(config))
+    simulator.run(1.0)
+    distances = simulator.positions[5:, 1] - simulator.positions[:5, 1]
+    return 1e3 * float(distances.mean()), 10.0 + 1e3 * resting_gap(4.0)
+
+
+def slide_on_a_ribbon() -> tuple[float, float]:
+    """Return the acceleration of a strip down another one on a steep slope [m/s²]."""
+    upper = rod([layer(thickness=2e-3)], 0.02, 5, (0.002, 0, 4.98e-3), "upper")
+    lower = rod([layer(thickness=2e-3)], 0.08, 17, (0, 0, 1.99e-3), "lower", clamp_start="wall")
+    config = scene(
+        [lower, upper],
+        gravity=tilted_gravity(STEEP),
+        obstacles=[GROUND],
+        bodies=[fixed(position=(0, 0, 1.99e-3))],
+        contact=contact(coefficient=SLIPPERY),
+        solver={"model": "laminate"},
+    )
+    simulator = Simulator(load_scene(config))
+    nodes = slice(17, None)
+    simulator.run(0.05)
+    before = simulator.velocities[nodes].mean(axis=0)
+    simulator.run(0.1)
+    found = (simulator.velocities[nodes].mean(axis=0) - before) / 0.1
+    return float(found[0]), GRAVITY * (math.sin(STEEP) - SLIPPERY * math.cos(STEEP))
+
+
+def overlap(config: dict, time: float, looks: int) -> tuple[float, float]:
+    """Return how deep rods go into each other, as rectangles with round borders, at some moments of a run [mm]; 0."""
+    simulator = Simulator(load_scene(config))
+    judge, least = GapCheck(simulator.model), math.inf
+    for _ in range(looks):
+        simulator.run(time / looks)
+        least = min(least, judge.smallest(judge.moment(simulator.frame())))
+    return 1e3 * max(-least, 0.0), 0.0
+
+
+def petals() -> tuple[float, float]:
+    """Return the overlap of petals of gel on paper, wide enough to meet with their edges as they close [mm]."""
+    gel = {"youngs_modulus": 2e7, "poisson_ratio": 0.49, "density": 1050.0, "retardation_time": 5e-4}
+    paper = {"youngs_modulus": 2e9, "poisson_ratio": 0.3, "density": 800.0, "retardation_time": 5e-4}
+    swelling = {"stimulus": "base", "gain": 0.1, "interval": [0.0, 0.02]}
+    layers = [layer("gel", 8e-4, "gel", eigenstrain=swelling), layer("paper", 1e-4, "paper")]
+    width = {"at": [0, 0.025, 0.05], "value": [0.008, 0.014, 0.003]}
+    pattern = {"axis": [0, 0, 1], "center": [0, 0, 0], "count": 5}
+    petal = rod(layers, 0.05, 26, (0.01, 0, 0), "petal", width, pattern=pattern, clamp_start="centre")
+    config = scene(
+        [petal],
+        bodies=[fixed("centre")],
+        stimuli={"base": {"schedule": {"type": "ramp", "start": 0.0, "end": 1.5, "from": 0, "to": 1}}},
+        contact={**contact(3e-4, 0.4, 1e-3), "stiffness": 1e6},
+        solver={"model": "laminate", "integrator": "sdirk2", "dt": 5e-3},
+    )
+    return overlap({**config, "materials": {"gel": gel, "paper": paper}}, 1.8, 6)
+
+
+def roll() -> tuple[float, float]:
+    """Return the overlap of the turns of a coated slab that rolls up by its film [mm]."""
+    soft, stiff = (
+        {"youngs_modulus": modulus, "poisson_ratio": 0.45, "density": 1000.0, "retardation_time": 2e-3}
+        for modulus in (1e6, 1e8)
+    )
+    swelling = {"stimulus": "film", "gain": -0.1}
+    layers = [layer("slab", 2e-3, "slab"), layer("film", 1e-4, "film", eigenstrain=swelling)]
+    config = scene(
+        [rod(layers, 0.08, 81, clamp_start="wall")],
+        bodies=[fixed()],
+        damping={"mass": 20.0},
+        stimuli={"film": {"schedule": {"type": "ramp", "start": 0, "end": 0.5, "from": 0, "to": 1}}},
+        contact={"barrier_distance": 2e-4, "stiffness": 1e6, "rods": True},
+        solver={"model": "laminate", "dimension": 2, "integrator": "sdirk2", "dt": 1e-3},
+    )
+    return overlap({**config, "materials": {"slab": soft, "film": stiff}}, 0.8, 8)
+
+
+@cache
+def resting_gap(times: float = 1.0) -> float:
+    """Return the gap d [m] at which the barrier carries some times 10 mm × 2 mm of density 1000: K_c [2(d − d̂)
+    log(d/d̂) + (d − d̂)²/d] = q.
+    """
+    limit, stiffness, weight = 1e-3, 1e7, times * 1000.0 * GRAVITY * 0.01 * 2e-3
 
     def excess(d: float) -> float:
         return stiffness * (2.0 * (d - limit) * math.log(d / limit) + (d - limit) ** 2 / d) - weight
@@ -224,6 +319,32 @@ CASES = [
         for model in ("laminate", "two_rod")
         for dimension in (2, 3)
     ),
+    Case(
+        "contact/ribbons side by side",
+        "width and the gap at which a quarter of the barrier carries the load: distance of middles",
+        1e-4,
+        side_by_side,
+        "mm",
+    ),
+    Case(
+        "contact/petals that close",
+        "overlap of rectangles with round borders, as part of the thickness",
+        0.05,
+        petals,
+        "mm",
+        scale=0.9,
+        long=True,
+    ),
+    Case(
+        "contact/coated slab that rolls up",
+        "overlap of its turns, as part of the thickness",
+        0.01,
+        roll,
+        "mm",
+        scale=2.1,
+        long=True,
+    ),
+    Case("contact/slide on a ribbon", "g (sin α − μ cos α)", 0.005, slide_on_a_ribbon, "m/s²"),
     Case("contact/rebound at 14 m/s", "energy of a flat strip with sound at 3 m/s, over that before", 0.005, rebound),
     Case("contact/creep", "ε_v (1 − √(1 − tan α/μ))", 0.01, creep, "µm/s"),
     *(
