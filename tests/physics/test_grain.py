@@ -34,6 +34,7 @@ def test_derivatives_of_friction_along_a_grain_agree_with_differences(of, model,
     else:
         content["obstacles"][0]["grain"] = [1, -1, 0.2]
         content["bodies"][1]["surface"]["grain"] = [0.3, 1, 0.5]
+    content["contact"]["rods"] = False  # noise moves borders of arms into each other
     problem = Problem(content, np.random.default_rng(4), model, dimension)
     check(problem, ("friction",))
     sliding = problem.evaluator.problem.sliding
