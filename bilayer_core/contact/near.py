@@ -24,9 +24,10 @@ distance, so
 
 and a ball presses on π/(2 SAG) = 31 points at most, however large it is. (Contact on flat faces has more of them, which
 is what `Surfaces.least_spacing` is for; and a strip that is bent away from a surface with the curvature κ has
-ρ = 1/(1/R + κ).) Stations, borders and ends are points of each grid. A point stands for its part of the width and of
-the rod's length; where a ball presses, the width is that of the patch 2√(2ρd̂) within which it can, if that is
-narrower.
+ρ = 1/(1/R + κ).) A plane, R = ∞, meets rods in such points where one is bent so much that it sinks deeper between
+stations; across the width it has the borders and the middle. Stations, borders and ends are points of each grid. A
+point stands for its part of the width and of the rod's length; where a ball presses, the width is that of the patch
+2√(2ρd̂) within which it can, if that is narrower.
 
 `surfaces` is a record `Surfaces`, `at` a configuration, `Configuration` (`model.records`).
 """
@@ -191,7 +192,7 @@ def _list_between(surfaces, at, s, limit, count):
                 s,
                 i,
                 (along_b, along_a, part_b, part_a, height, border),
-                spacing,
+                max(spacing, border) if surfaces.kind[s] == PLANE else spacing,
                 radius,
                 weight,
                 limit,
@@ -245,11 +246,14 @@ def list_near(surfaces, at, margin):
     """
     bound, group, can_collide, rods = surfaces.bound, surfaces.group, surfaces.can_collide, surfaces.rod_points
     point, position, extent, nodes = at.contact_point, at.surface_position, surfaces.extent, surfaces.node_part.shape[0]
-    placed, count, smallest = point.shape[0], 0, math.inf
+    placed, count, smallest, longest = point.shape[0], 0, math.inf, 0.0
+    for e in range(surfaces.edge_length.shape[0]):
+        longest = max(longest, surfaces.edge_length[e])
     mix = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for s in range(position.shape[0]):
         plane, between = surfaces.kind[s] == PLANE, surfaces.sharpest[s] >= 0.0
         extent[s] = margin if plane else bound[s]
+        beyond = rods.longest + longest if between else 0.0
         for i in range(group.shape[0]):
             if not can_collide[s, group[i]]:
                 continue
@@ -268,7 +272,7 @@ def list_near(surfaces, at, margin):
                 square += (x[c] - position[s, c]) ** 2
             limit = max(surfaces.d_hat + margin, smallest + 2.0 * margin)
             if plane:
-                extent[s] = max(extent[s], math.sqrt(square) + margin)
+                extent[s] = max(extent[s], math.sqrt(square) + margin + beyond)
             elif square > (bound[s] + radius + limit) ** 2:
                 continue
             gap = gap_normal(surfaces, at, radius, s, x[0], x[1], x[2])[0]

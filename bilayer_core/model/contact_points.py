@@ -18,6 +18,7 @@ from bilayer_core.model.set_friction import friction_values
 from bilayer_core.model.shape_numbers import NUMBER, Shape, obstacle_pose, shape_of, signed_distance
 from bilayer_core.model.strand_arrays import StrandArrays
 from bilayer_core.model.strands import Collected
+from bilayer_core.model.validity import bend_of
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.shape import Obstacle, Surface
 
@@ -89,7 +90,8 @@ def build_contact(
 
     point_body, moved_by = np.concatenate([np.full(nodes, -1), own, free]), np.concatenate([held_by, own, free])
     section = of_rods.section
-    demands = [demand_of(surface.shape, strip_area(section)) for surface in surfaces]
+    bend, flat = bend_of(scene), np.array([surface.shape.kind == "plane" for surface in surfaces], dtype=bool)
+    demands = [demand_of(surface.shape, strip_area(section), bend) for surface in surfaces]
     sharpest, least_spacing = np.array(demands).reshape(-1, 2).T
     dense = bool((sharpest >= 0.0).any())
     arms = np.hypot(section[:, 1], section[:, 2]) if dense else np.linalg.norm(of_rods.arm, axis=1)
@@ -136,7 +138,7 @@ def build_contact(
         position=np.array([s.position for s in surfaces]).reshape(-1, 3),
         rotation=np.array([s.rotation @ s.shape.rotation for s in surfaces]).reshape(-1, 3, 3),
         can_collide=np.ascontiguousarray(groups.T),
-        edge_can_cross=_of_edges(found, of_nodes[:, used]) & (sharpest >= 0.0)[:, None],
+        edge_can_cross=_of_edges(found, of_nodes[:, used]) & ~flat[:, None],
         margin=np.zeros(1),
     )
     surface_grain = np.array([s.grain for s in surfaces]).reshape(-1, 3)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bilayer_core.contact.near import SAG
-from bilayer_core.contact.shapes import SPHERE
+from bilayer_core.contact.shapes import PLANE, SPHERE
 from bilayer_core.kinematics.frame_strains import cross
 from bilayer_core.model.model import Model
 from bilayer_core.model.shape_numbers import Shape
@@ -40,14 +40,15 @@ def strip_area(section: Array) -> float:
     return float((2.0 * (section[:, 0] + section[:, 1]) * section[:, 3]).sum())
 
 
-def demand_of(shape: Shape, area: float) -> tuple[float, float]:
-    """Return the least radius of what is not flat of a shape, −1 of a plane, and the least distance of points [m].
+def demand_of(shape: Shape, area: float, bend: float) -> tuple[float, float]:
+    """Return the least radius of what is not flat of a shape, of a plane that of rods on it (`bend_of`, −1 if none has
+    points between stations), and the least distance of points [m].
 
     Points as dense as sharp edges demand would be many on large faces: their distance is such that those of rods of an
     area [m²] on a face of a box, or on the end of a cylinder, are `MOST_ON_FLAT` at most.
     """
     if shape.kind == "plane":
-        return -1.0, 0.0
+        return bend, 0.0
     a, b, c = shape.core
     flat = 4.0 * max(a * b, b * c, c * a) if shape.kind == "box" else np.pi * a * b
     return shape.rounding, math.sqrt(min(flat, area) / MOST_ON_FLAT)
@@ -74,9 +75,9 @@ def points_between(model: Model, s: int, centre: Array, within: float) -> Iterat
     is_end = (edges[:, 0] == edges[:, 1]) & (section[:, 3] > 0.0)
     reach = within + surfaces.bound[s] + section[:, 0] + 1.25 * np.linalg.norm(edge, axis=1)[edges].max(axis=1)
     reach += surfaces.rod_points.longest
-    for i in np.flatnonzero(
-        meets[edges].any(axis=1) & (section[:, 3] > 0.0) & (np.linalg.norm(x - centre, axis=1) < reach)
-    ).tolist():
+    flat = surfaces.kind[s] == PLANE
+    is_near = flat | (np.linalg.norm(x - centre, axis=1) < reach)
+    for i in np.flatnonzero(meets[edges].any(axis=1) & (section[:, 3] > 0.0) & is_near).tolist():
         (b, a), single = edges[i], False
         if is_end[i]:
             single = surfaces.node_part[i, 1] == 1.0 and bool(is_end[i + 1])
@@ -99,7 +100,7 @@ def points_between(model: Model, s: int, centre: Array, within: float) -> Iterat
             along, shares = np.stack([0.0 * part, part], axis=1), np.array([0.0, 1.0]) + 0.0 * along
         if surfaces.kind[s] == SPHERE:
             weight *= np.maximum(1.0, border / np.sqrt(2.0 * (surfaces.sharpest[s] + radius) * surfaces.d_hat))
-        half = int(np.ceil(border.max() / apart))
+        half = int(np.ceil(border.max() / (max(apart, border.max()) if flat else apart)))
         across = np.arange(-half, half + 1) / max(half, 1)
         share = np.where(np.abs(across) == 1.0, 0.25, 0.5) / half if half else np.ones(1)
         middle = x[i] + along @ edge[[b, a]] + height[:, None] * (shares @ m1[[b, a]])

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import inf
 
 import numpy as np
 
+from bilayer_core.contact.near import SAG
 from bilayer_core.model.findings import Figure
 from bilayer_core.model.plate_strip import curved_stiffness, folds, swollen_curvature
 from bilayer_core.model.points_between import demand_of, spacing
@@ -153,15 +155,28 @@ def longest_edge(scene: SceneConfig, rod: Rod) -> float:
     return COARSE * float(edge_figures(scene, rod).thickness.min() + scene.contact.barrier_distance)
 
 
+def bend_of(scene: SceneConfig) -> float:
+    """Return the least radius to which rods bend between stations so that a plane comes nearer there than at them by
+    more than the part `SAG` of the barrier distance [m], −1 if none does.
+
+    An edge of length l that is bent by κ sags by ⅛ κ l². The curvature is the largest without loads.
+    """
+    deepest, largest = 8.0 * SAG * (scene.contact.barrier_distance if scene.contact else inf), 0.0
+    for rod in scene.rods:
+        curvature = edge_figures(scene, rod).curvature()
+        largest = max(largest, curvature[curvature * rod.edge_length**2 > deepest].max(initial=0.0))
+    return 1.0 / largest if largest > 0.0 else -1.0
+
+
 def _of_points(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
     """Return how far apart a rod's contact points are for the surface that may sink deepest between them."""
     shaped = [(body.name, body.surface) for body in scene.bodies if body.surface is not None]
     shaped += [(obstacle.name, obstacle) for obstacle in scene.obstacles]
     radius, distance, worst = 0.5 * float(at_edges.thickness.min()), scene.contact.barrier_distance, None
-    area = float(at_edges.width.max()) * rod.path.length
+    area, bend = float(at_edges.width.max()) * rod.path.length, bend_of(scene)
     for name, surface in shaped:
-        demand = demand_of(shape_of(surface), area)
-        if demand[0] < 0.0:  # a plane
+        demand = demand_of(shape_of(surface), area, bend)
+        if demand[0] < 0.0:  # a plane that meets stations
             continue
         apart = spacing(demand, radius, distance)
         sag = apart**2 / (4.0 * (demand[0] + radius))

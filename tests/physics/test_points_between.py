@@ -90,6 +90,31 @@ def test_the_points_that_kernels_make_are_those_of_the_pattern(stations, dimensi
     assert np.array(found) == pytest.approx(np.array(sorted(expected)), rel=1e-6, abs=1e-8)  # one step has moved it
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_plane_meets_a_bent_rod_between_stations_and_a_straight_one_at_them(dimension):
+    ring = rod([layer(thickness=THICK)], stations=33, width=WIDTH)
+    path = {"shape": "arc", "start": [0, 0, 0.5 * THICK + 0.5 * D_HAT], "direction": [1, 0, 0], "closed": True}
+    ring |= {"path": path | {"radius": 0.05, "angle": "360 deg"}, "normal": [0, 0, 1]}
+    straight = rod([layer(thickness=THICK)], stations=33, width=WIDTH, start=(0, 0, 0.5 * THICK + 0.5 * D_HAT))
+    ground = {"obstacles": [{"name": "ground", "type": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]}]}
+    for strip, spaced in ((ring, True), (straight, False)):
+        content = scene([strip], contact=contact(D_HAT), materials=WIDE, **ground)
+        simulator = Simulator(load_scene(content), dimension=dimension, dt=1e-7)
+        simulator.run(1e-7)
+        listed = simulator._stepper.engine._storage.problem.surfaces
+        own = slice(int(listed.near_count[0]))
+        pressed = (listed.near_gap[own] < D_HAT) & (listed.near_weight[own] > 0.0)
+        found = sorted(zip(listed.near_gap[own][pressed], listed.near_weight[own][pressed], strict=True))
+        cells = list(points_between(simulator.model, 0, np.zeros(3), 1.0))
+        if spaced:
+            places = [(cell.place[:, 2] - cell.radius, cell.weight) for cell in cells]
+            expected = [(d, w) for gaps, weights in places for d, w in zip(gaps, weights, strict=True) if d < D_HAT]
+            assert sum(cell.weight.sum() for cell in cells) == pytest.approx(listed.edge_length[:32].sum(), rel=1e-12)
+            assert len(found) > 3 and np.array(found) == pytest.approx(np.array(sorted(expected)), rel=1e-6, abs=1e-8)
+        else:
+            assert cells == [] and sum(weight for _, weight in found) == pytest.approx(LENGTH, rel=1e-12)
+
+
 def test_a_ball_that_starts_inside_a_strip_beside_its_borders_and_middle_is_refused():
     place = (0.0012, 0.0045, 0.5e-3 + 0.5 * THICK - 1e-5)
     content = wide_strip({"shape": "sphere", "radius": 0.5e-3}, (place, [0, 0, 0]))
