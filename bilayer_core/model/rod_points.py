@@ -65,12 +65,12 @@ def rod_points(found: Collected, in_plane: bool) -> RodPoints:
     border = np.zeros_like(half) if in_plane else 0.5 * width - half
     border[border <= NO_ARM * thickness] = 0.0
     height = np.where(np.abs(offset) <= NO_ARM * thickness, 0.0, offset)
-    height[length == 0.0] = border[length == 0.0] = 0.0  # copies of other nodes
-    middle = np.where(border > 0.0, 1.0 - 2.0 * OF_BORDER, 1.0)
+    middle, own = np.where(border > 0.0, 1.0 - 2.0 * OF_BORDER, 1.0), length > 0.0  # not a copy of another node
+    raised, wide = np.flatnonzero(own & (height != 0.0)), np.flatnonzero(own & (border > 0.0))
     parts = [
-        (np.flatnonzero(height), 0.0, middle),
-        (np.flatnonzero(border), -border, np.full_like(border, OF_BORDER)),
-        (np.flatnonzero(border), border, np.full_like(border, OF_BORDER)),
+        (raised, 0.0, middle),
+        (wide, -border, np.full_like(border, OF_BORDER)),
+        (wide, border, np.full_like(border, OF_BORDER)),
     ]
     node = np.concatenate([nodes for nodes, _, _ in parts])
     across = np.concatenate([np.broadcast_to(side, half.shape)[nodes] for nodes, side, _ in parts])
