@@ -25,9 +25,10 @@ distance, so
 and a ball presses on π/(2 SAG) = 31 points at most, however large it is. (Contact on flat faces has more of them, which
 is what `Surfaces.least_spacing` is for; and a strip that is bent away from a surface with the curvature κ has
 ρ = 1/(1/R + κ).) A plane, R = ∞, meets rods in such points where one is bent so much that it sinks deeper between
-stations; across the width it has the borders and the middle. Stations, borders and ends are points of each grid. A
-point stands for its part of the width and of the rod's length; where a ball presses, the width is that of the patch
-2√(2ρd̂) within which it can, if that is narrower.
+stations; across the width it has the borders and the middle, and an end stands on it with its whole half edge, as it
+does where no points are between stations. Stations, borders and ends are points of each grid. A point stands for its
+part of the width and of the rod's length; where a ball presses, the width is that of the patch 2√(2ρd̂) within which
+it can, if that is narrower.
 
 `surfaces` is a record `Surfaces`, `at` a configuration, `Configuration` (`model.records`).
 """
@@ -137,7 +138,7 @@ def spacing_between(surfaces, s, radius):
 @kernel
 def _list_between(surfaces, at, s, limit, count):
     """List the points between stations and across the width whose gap to surface s is at most `limit`."""
-    edges, section = surfaces.node_edges, surfaces.section
+    edges, section, plane = surfaces.node_edges, surfaces.section, surfaces.kind[s] == PLANE
     for i in range(edges.shape[0]):
         b, a = edges[i, 0], edges[i, 1]
         if section[i, 3] == 0.0 or not (surfaces.edge_can_collide[s, b] or surfaces.edge_can_collide[s, a]):
@@ -164,6 +165,8 @@ def _list_between(surfaces, at, s, limit, count):
             continue
         for j in range(first, last + 1):
             other, part = i - 1 if j < 0 else i + 1, j / parts
+            if plane and parts // 2 < abs(j) < parts or (plane and single and 0 < j < parts):
+                continue
             if j != 0 and not surfaces.edge_can_collide[s, b if j < 0 else a]:
                 continue
             station = i if j == 0 else other if abs(j) == parts else -1
@@ -180,9 +183,8 @@ def _list_between(surfaces, at, s, limit, count):
                 along_b, along_a, part_b, part_a = 0.0, part, 0.0, 1.0
             elif j == 0:
                 weight = 0.5 * (surfaces.edge_length[b] + surfaces.edge_length[a])
-            weight /= parts
-            if abs(j) == parts or (single and j == 0):
-                weight *= 0.5
+            is_end = abs(j) == parts or (single and j == 0)
+            weight *= 0.5 if plane and is_end else (0.5 if is_end else 1.0) / parts
             if surfaces.kind[s] == SPHERE and border > 0.0:
                 patch = math.sqrt(2.0 * (surfaces.sharpest[s] + radius) * surfaces.d_hat)
                 weight *= max(1.0, border / patch)
@@ -192,7 +194,7 @@ def _list_between(surfaces, at, s, limit, count):
                 s,
                 i,
                 (along_b, along_a, part_b, part_a, height, border),
-                max(spacing, border) if surfaces.kind[s] == PLANE else spacing,
+                max(spacing, border) if plane else spacing,
                 radius,
                 weight,
                 limit,

@@ -90,12 +90,15 @@ def points_between(model: Model, s: int, centre: Array, within: float) -> Iterat
         j = np.arange(-before, after + 1)
         at_station = np.where(np.abs(j) == parts, i + np.sign(j), i)
         j = j[(np.abs(j) % parts > 0) | surfaces.node_can_collide[s, at_station]]
+        if flat:
+            j = j[(np.abs(j) == parts) | (j == 0) | (2 * np.abs(j) < (0 if single else parts))]
         part, aside = j / parts, np.abs(j)[:, None] / parts
         radius, border, height = (section[i, :3] + aside * (section[i + np.sign(j), :3] - section[i, :3])).T
         along = np.stack([0.5 * (part - part**2), 0.5 * (part + part**2)], axis=1)
         shares, weight = np.stack([0.5 - part, 0.5 + part], axis=1), surfaces.edge_length[np.where(j < 0, b, a)]
-        weight = np.where(j == 0, surfaces.edge_length[[b, a]].mean(), weight) / parts
-        weight[(np.abs(j) == parts) | (single & (j == 0))] *= 0.5
+        weight = np.where(j == 0, surfaces.edge_length[[b, a]].mean(), weight)
+        of_end = (np.abs(j) == parts) | (single & (j == 0))
+        weight = weight * np.where(of_end, 0.5, 1.0) / np.where(of_end & flat, 1, parts)
         if single:
             along, shares = np.stack([0.0 * part, part], axis=1), np.array([0.0, 1.0]) + 0.0 * along
         if surfaces.kind[s] == SPHERE:
