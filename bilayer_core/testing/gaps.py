@@ -4,8 +4,8 @@ Nothing here is shared with the solver but the geometry of the scene: what has w
 half edges. All pairs are looked at, without lists of near ones, but for robots of thousands of edges, whose near pairs
 scipy's k-d tree finds anew at every look; distances are computed by other formulas.
 
-- Surfaces are met by ribbons as they are (`testing.ribbons`), but half spaces by their stations alone, as the model has
-  it; by balls, and by the corners and rims of bodies (`testing.surfaces`).
+- Surfaces are met by ribbons as they are (`testing.ribbons`), by balls, and by the corners and rims of bodies
+  (`testing.surfaces`).
 - Rods meet rods as ribbons straight between stations, and those up to twice as wide as thick as round ones about the
   middle between their faces. On one rod, edges count that are at least as far apart along it as the model's own
   exclusion (`model.rod_surfaces`).

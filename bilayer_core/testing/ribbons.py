@@ -8,7 +8,7 @@ turns by more than 60 degrees: there the curve has a corner.
 `least_gap` halves pieces of the sheet. A piece goes once no point of it can be nearer to the surface than what was
 found: distances change by no more than the way, and from those of its corners by no more than ½ k way² + e where the
 surface bends by k and the piece lies within e of its corners. So pieces become as small as what is near demands, and
-no grid decides what is seen. The model meets half spaces at its stations; so does this.
+no grid decides what is seen.
 """
 
 from __future__ import annotations
@@ -146,8 +146,6 @@ class Sheet:
             The barrier distance [m], to a part of which the gap is found.
         enough : float
         """
-        if surface.kind == "plane":
-            return self._least_at_stations(edges, place)
         along_way, across_way, bend, turn = self.ways()
         edge, along, across = edges, np.full(len(edges), 0.5), np.zeros(len(edges))
         step, half = np.full(len(edges), 0.5), np.where(across_way[edges] > 0.0, 1.0, 0.0)
@@ -174,13 +172,6 @@ class Sheet:
             across = np.concatenate([across - moved[1], across + moved[1]])
             edge, step, half = (np.tile(of, 2) for of in (edge, step, half))
         return least
-
-    def _least_at_stations(self, edges: Array, place: tuple[Array, Array]) -> float:
-        """Return the least gap of stations to a half space [m]."""
-        ends = np.array([(0.0, -1.0), (0.0, 1.0), (1.0, -1.0), (1.0, 1.0)])
-        along, across = (np.repeat(of, len(edges)) for of in ends.T)
-        x, radius = self.at(np.tile(edges, len(ends)), along, across)
-        return float(((x - place[0]) @ place[1][:, 2] - radius).min(initial=math.inf))
 
     def flat(self, edge: Array, along: Array, across: Array, step: Array, half: Array) -> tuple[Rectangles, Array]:
         """Return rectangles that touch the sheet in the middles of pieces, and how far these are askew [m]."""
