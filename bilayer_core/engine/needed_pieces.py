@@ -36,12 +36,14 @@ def needed_pieces(model: Model) -> frozenset[str]:
     Left out are forces that do not act, band solvers of other widths, and pieces for another dimension and for bodies,
     contact of rods and light that the scene lacks. A few of the others wait for conditions that a run may never meet.
     """
-    width, joined = model.solved_layout.half_bandwidth, model.free_count > 0 or model.joins.exists
+    layout, joined = model.solved_layout, model.free_count > 0 or model.joins.exists
+    widths = {layout.half_bandwidth, layout.half_bandwidth_apart}
     meets = "rod barrier" in model.forces
     unused = (
-        *(pieces for other, pieces in SETS.items() if other != width),
+        *(pieces for other, pieces in SETS.items() if other not in widths),
         () if meets else (find_rod_contacts, bound_between_rods, take_rod_contacts),
-        () if meets or joined else (move_to_border, SETS[width][-1], factor_border, solve_bordered, count_border),
+        () if meets or joined else (move_to_border, factor_border, solve_bordered, count_border),
+        () if meets or joined else (SETS[width][-1] for width in widths),
         () if model.free_count else (assemble_bodies, restrict_bodies, add_contact_to_bodies),
         () if model.joins.exists else (move_joins_to_border,),
         () if model.light.exists else (begin_light, end_light),

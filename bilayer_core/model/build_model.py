@@ -134,6 +134,7 @@ def _rods(found: Collected, layout: Layout, solved: Layout, plane: ScenePlane | 
         edge_count=found.edge_count,
         bend_count=found.joint_count,
         bandwidth=solved.half_bandwidth,
+        bandwidth_apart=solved.half_bandwidth_apart,
         axes=np.eye(3) if plane is None else plane.axes,
         row=solved.node,
         node_unknown=layout.node,

@@ -68,6 +68,8 @@ class Layout(ReadOnlyArrays):
         Unknowns of nodes and edges.
     half_bandwidth : int
         Largest difference of two coupled unknowns; a compile-time constant of the solver.
+    half_bandwidth_apart : int
+        Likewise while no rods touch.
     dimension : int
         Unknowns of a node: 3, or 2 in a plane.
     node : ndarray
@@ -82,6 +84,7 @@ class Layout(ReadOnlyArrays):
 
     size: int
     half_bandwidth: int
+    half_bandwidth_apart: int
     dimension: int
     node: np.ndarray
     edge: np.ndarray
@@ -126,5 +129,7 @@ def number_unknowns(
     attached_of_unknown[(attached[:, None] + np.arange(dimension)).ravel()] = np.repeat(
         np.arange(len(attached)), dimension
     )
-    half_bandwidth = (OF_RAILS if has_rails else HALF_BANDWIDTH)[dimension][max(len(layers) for layers in rods)]
-    return Layout(size, half_bandwidth, dimension, node, edge, attached, attached_of_unknown)
+    most = max(len(layers) for layers in rods)
+    apart = HALF_BANDWIDTH[dimension][most]
+    touching = OF_RAILS[dimension][most] if has_rails else apart
+    return Layout(size, touching, apart, dimension, node, edge, attached, attached_of_unknown)

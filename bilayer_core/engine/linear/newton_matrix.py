@@ -37,7 +37,7 @@ from bilayer_core.engine.linear.raised_blocks import assemble_raised
 from bilayer_core.engine.linear.widths import eliminate, factorise_band, go_backward, go_forward
 from bilayer_core.engine.request_modes import SLOWEST_GROWTH, WITHOUT_INERTIA
 from bilayer_core.forces.rod_contact import rods_touch
-from bilayer_core.jit import piece
+from bilayer_core.jit import kernel, piece
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import BORDER_CAPACITY_EXCEEDED, INDEFINITE, NOT_FINITE, READY
 from bilayer_core.model.records.step import Configuration, Stage
@@ -111,10 +111,11 @@ def factorise(p, at, stage, counts):
             move_joins_to_border(p)
         if p.contact_columns.exists and not move_to_border(p):
             return BORDER_CAPACITY_EXCEEDED
-        negative = factorise_band(band, strands.size, counts)
+        b = p.system.half_bandwidth[0] = _half_bandwidth(p)
+        negative = factorise_band(band, strands.size, b, counts)
         if counts or negative < 0:
             if p.bordered.exists and p.bordered.coupled[0] == 1:
-                eliminate(band, strands.size, p.bordered)
+                eliminate(band, strands.size, b, p.bordered)
             if counts:
                 of_border = count_border(p) if p.bordered.exists else 0
                 p.system.negative[0] = negative + of_border
@@ -131,10 +132,19 @@ def factorise(p, at, stage, counts):
             return INDEFINITE
 
 
+@kernel
+def _half_bandwidth(p):
+    """Return the half-bandwidth of the assembled matrix: elements and nodes alone reach as far as contacts of rods
+    leave them.
+    """
+    touching = p.rod_contact.exists and p.contact_columns.contacts > 0
+    return p.strands.bandwidth if touching else p.strands.bandwidth_apart
+
+
 @piece(int, Problem)
 def solve(p):
     """Return minus the inverse of the factorised matrix times the present gradient, to `step` and `body_step`."""
-    size, system, right = p.strands.size, p.system, p.system.right
+    size, system, right, b = p.strands.size, p.system, p.system.right, p.system.half_bandwidth[0]
     if p.space.exists:
         for j in range(p.sums.gradient.shape[0]):
             right[j] = p.sums.gradient[j]
@@ -146,10 +156,10 @@ def solve(p):
         right[j] = 0.0
     gather_joins(p.joins, p.bodies.freedom, p.bordered, right)
     gather_columns(p.contact_columns, p.bordered, right)
-    go_forward(system.band, size, right)
+    go_forward(system.band, size, b, right)
     if p.bordered.exists:
         solve_bordered(p)
-    go_backward(system.band, size, right)
+    go_backward(system.band, size, b, right)
     scatter_joins(p.joins, p.bodies.freedom, p.bordered, right)
     scatter_columns(p.contact_columns, p.bordered, right)
     if p.space.exists:

@@ -75,9 +75,8 @@ factor_26, forward_26, backward_26, eliminate_26 = SETS[26] = _of_width(26)
 
 
 @kernel
-def factorise_band(band, n, counts):
-    """Factorise a band of any of these widths, as `band.factor_band`."""
-    b = band.shape[1] - 1
+def factorise_band(band, n, b, counts):
+    """Factorise a band of any of these half-bandwidths, as `band.factor_band`; the band may hold more columns."""
     if b == 5:
         return factor_5(band, n, counts)
     if b == 7:
@@ -96,9 +95,8 @@ def factorise_band(band, n, counts):
 
 
 @kernel
-def go_forward(band, n, right):
+def go_forward(band, n, b, right):
     """Overwrite `right` with L⁻¹ times it, as `band.forward_band`."""
-    b = band.shape[1] - 1
     if b == 5:
         return forward_5(band, n, right)
     if b == 7:
@@ -115,9 +113,8 @@ def go_forward(band, n, right):
 
 
 @kernel
-def go_backward(band, n, right):
+def go_backward(band, n, b, right):
     """Overwrite `right` with what `band.backward_band` finds."""
-    b = band.shape[1] - 1
     if b == 5:
         return backward_5(band, n, right)
     if b == 7:
@@ -134,9 +131,8 @@ def go_backward(band, n, right):
 
 
 @kernel
-def eliminate(band, n, bordered):
+def eliminate(band, n, b, bordered):
     """Eliminate the band from the border, as `band.eliminate_band`."""
-    b = band.shape[1] - 1
     if b == 5:
         return eliminate_5(band, n, bordered)
     if b == 7:

@@ -18,6 +18,7 @@ class Strands:
     edge_count: int
     bend_count: int  # the first joints bend and twist; the others, if any, are those of bonds
     bandwidth: int  # half of it, without the diagonal
+    bandwidth_apart: int  # likewise while no rods touch
     axes: Matrix  # directions of a node's unknowns in the matrix, shape (dimension, 3)
     row: Indices  # first of them in the matrix, shape (n_node,)
     node_unknown: Indices  # slot of a node in gradients and steps, which are vectors in space, shape (n_node,)

@@ -71,6 +71,7 @@ class System:
     """The Newton matrix, its factors, and steps; see `engine.linear.newton_matrix`."""
 
     band: Matrix = ("row", "band")
+    half_bandwidth: Indices = (1,)  # of the factors: less than the band has room for while no rods touch
     right: Vector = ("row",)
     step: Vector = ("unknown",)
     body_step: Matrix = ("free", 6)
