@@ -67,15 +67,15 @@ def most_of_turn(rails, strands, system, at):
 def write_swings(rails, strands, system, at, part):
     """Write the swing of each rail in a part of a step [m]; return the largest."""
     largest, nodes = 0.0, rails.node_edges.shape[0]
-    for i in range(nodes):
+    for r in range(nodes):
         turn = 0.0
-        if has_arm(rails, i):
+        if has_arm(rails, r):
             for side in range(2):
-                e = rails.node_edges[i, side]
+                e = rails.node_edges[rails.node[r], side]
                 slope = _slope(strands, system, at, e)
                 turn = max(turn, 1.3 * slope / (1.0 - part * slope) + abs(system.angle_step[e]))
-        rails.swing[i] = math.sqrt(rails.arm[i, 0] ** 2 + rails.arm[i, 1] ** 2) * turn
-        largest = max(largest, rails.swing[i])
+        rails.swing[r] = math.sqrt(rails.arm[r, 0] ** 2 + rails.arm[r, 1] ** 2) * turn
+        largest = max(largest, rails.swing[r])
     for r in range(nodes, rails.node.shape[0]):  # right borders are as far from their nodes as left ones
         rails.swing[r] = rails.swing[rails.node[r]]
     return largest

@@ -90,7 +90,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         free_bodies=bodies,
         constrained=constrained,
         attachments=_attachments(constrained, solved, rods) if len(bodies.mass) else Attachments.absent(),
-        joins=_joins(joined_node, joined_edge, solved),
+        joins=_joins(found, solved, rails.exists),
         flow=flow,
         fluid=fluid,
         loads=loads,
@@ -229,10 +229,16 @@ def _attachments(held: Constrained, solved: Layout, rods: Strands) -> Attachment
     )
 
 
-def _joins(node: np.ndarray, edge: np.ndarray, solved: Layout) -> Joins:
-    """Return the unknowns of nodes and edges that closed strands have twice, each with its copy; absent without any."""
+def _joins(found: Collected, solved: Layout, has_rails: bool) -> Joins:
+    """Return the unknowns that have join columns (`engine.linear.closed_rods`), each with its copy; absent without any
+    closed strands.
+    """
+    node, edge = found.column("joined_node", np.int64, 2), found.column("joined_edge", np.int64, 2)
     if not len(node):
         return Joins.absent()
+    if has_rails:
+        node = np.concatenate([node, node[1::2, :1] + [[1, 1]]])
+        edge = np.concatenate([edge, edge[:, :1] + [[1, 1]]])
     of_nodes = solved.node[node][:, None] + np.arange(solved.dimension)[:, None]
     of_edges = solved.edge[edge] if solved.dimension == 3 else edge[:0]
     unknowns = np.concatenate([of_nodes.reshape(-1, 2), of_edges])

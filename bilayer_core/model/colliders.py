@@ -130,7 +130,7 @@ def is_ribbon(rod: Rod, times: float = 1.0) -> bool:
 
 def meets_with_borders(rod: Rod) -> bool:
     """Return whether a rod has borders for other rods in space: `contact.rails`."""
-    return not rod.closed and is_ribbon(rod, ROUND)
+    return is_ribbon(rod, ROUND)
 
 
 def _is_ribbon(rod: Rod, times: float) -> bool:

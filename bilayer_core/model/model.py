@@ -147,7 +147,8 @@ class Model(ReadOnlyArrays):
         bodies.
         """
         held = self.solved_layout.dimension * len(self.constrained.node)
-        return self.solved_layout.size - held - len(self.joins.first) + self.free_bodies.freedom.shape[1]
+        twice = int(np.count_nonzero(self.joins.first != self.joins.copy))
+        return self.solved_layout.size - held - twice + self.free_bodies.freedom.shape[1]
 
     @property
     def start_director1(self) -> Array:

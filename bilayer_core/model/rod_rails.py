@@ -16,7 +16,8 @@ Array = np.ndarray
 def build_rails(found: Collected, ribbons: set[str]) -> Rails:
     """Return the record, absent if the rails are the nodes.
 
-    Closed strands have neither heights nor borders: there rods meet round their curve, up to the farther face.
+    The first rails of a closed strand are those of the copy of its first node (`model.strand_arrays`), which has an edge
+    on either side.
 
     Parameters
     ----------
@@ -30,8 +31,7 @@ def build_rails(found: Collected, ribbons: set[str]) -> Rails:
     extra = []
     for strand in found.strands:
         own = slice(strand.first_node, strand.first_node + strand.node_count)
-        if not strand.closed:
-            height[own] = np.where(np.abs(strand.offset) <= NO_ARM * strand.thickness, 0.0, strand.offset)
+        height[own] = np.where(np.abs(strand.offset) <= NO_ARM * strand.thickness, 0.0, strand.offset)
         if strand.rod in ribbons:
             border[own] = np.maximum(0.5 * (strand.width - strand.thickness), 0.0)
             first = found.node_count + sum(map(len, extra))
@@ -44,6 +44,9 @@ def build_rails(found: Collected, ribbons: set[str]) -> Rails:
         return Rails.absent()
     node = np.concatenate([node, *extra])
     arm = np.concatenate([arm, *([1.0, -1.0] * arm[own] for own in extra)])
+    for strand in found.strands:
+        if strand.closed:
+            node[node == strand.first_node] = strand.last_node
     edges, size = found.column("node_edges", np.int64, 2), np.linalg.norm(arm, axis=1)
     slope = size / found.column("rest_length")[edges[node]].min(axis=1)
     turn = size / found.column("half_width")[edges[node]].min(axis=1)

@@ -10,8 +10,8 @@ for a half and a quarter of its length each; as many across its ends as on a rou
 for where borders meet, see `contact.segment`.
 
 A point sees edges of its own rod from the arc distance `rod_exclusion` on, all layers alike: the larger of `FEW_EDGES`
-edges and π/2 (H + d̂), with H the thickness of the rod, or of a closed one twice the radius about its nodes where these
-are nearer to one face. A rod that met itself nearer than that would be bent more sharply than half of it.
+edges and π/2 (H + d̂), with H the thickness of the rod. A rod that met itself nearer than that would be bent more
+sharply than half of it.
 
 Edges that are copies (`model.strand_arrays`) have no points, and belong to one rod more that meets nothing.
 """
@@ -75,9 +75,7 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected, in_plane: bool) -> 
     joined = _joined(scene, rods)
     flat = {copy.name for index, copy in copies if meets_with_borders(scene.rods[index]) and not in_plane}
     rails, rest_length = build_rails(found, flat), found.column("rest_length")
-    half = 0.5 * np.concatenate([strand.thickness for strand in found.strands])
-    round_closed = np.concatenate([np.full(strand.node_count, strand.closed) for strand in found.strands])
-    node_radius = np.where(round_closed, found.column("node_radius"), half)
+    node_radius = 0.5 * np.concatenate([strand.thickness for strand in found.strands])
     right = rails.right if rails.exists else np.full(found.edge_count, -1)
     thickness = [float(edge_figures(scene, rod).thickness.max()) for rod in scene.rods]
     thickest = [thickness[index] for index in scene_index]
@@ -99,7 +97,8 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected, in_plane: bool) -> 
         spacings, ends = [radius], ()
         if right[strand.first_edge] >= 0:
             spacings.append(max(radius, ACROSS * float(strand.width.min())))
-            ends = tuple(_points_across(rails, node, radius) for node in (strand.first_node, strand.first_node + edges))
+            at_ends = (strand.first_node, strand.first_node + edges)
+            ends = (3, 3) if strand.closed else tuple(_points_across(rails, node, radius) for node in at_ends)
         per_edge = tuple(max(1, math.ceil(longest / each * (1.0 - 1e-9))) for each in spacings)
         if not meets[number]:
             per_edge, ends = (0,), ()
@@ -111,14 +110,14 @@ def build_rod_surfaces(scene: SceneConfig, found: Collected, in_plane: bool) -> 
         strands = list(alike)
         count = per_edge[0] * edges
         if ends:
-            count = 2 * (count + 1) + 3 * (per_edge[1] * edges - 1) + sum(ends)
+            count = 2 * (count + 1) + 3 * (per_edge[1] * edges - 1) + sum(ends)  # of a closed strand five fewer
         total += count * len(strands)
         if total > MOST_POINTS:
             raise _too_thin(scene, strands[0], radius, total)
         order = np.array([[strand.first_edge] for strand in strands]) + np.arange(edges)
         own = _strand_points(spacing, start, rest_length[order], per_edge[0], strands[0].closed)
         if ends:
-            few = _strand_points(spacing, start, rest_length[order], per_edge[1], False)
+            few = _strand_points(spacing, start, rest_length[order], per_edge[1], strands[0].closed)
             own = _ribbon_points(few, own, len(strands), ends)
         else:
             count = len(own["point_fraction"])

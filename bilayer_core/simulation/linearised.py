@@ -131,7 +131,7 @@ class Linearised:
         if model.joins.exists:
             for first, copy in zip(model.joins.first, model.joins.copy, strict=True):
                 columns[copy, first] = 1.0
-                fixed[copy] = True
+                fixed[copy] |= copy != first
         free = columns.tocsc()[:, np.flatnonzero(~fixed)]
         if within is not None:
             free = self._in_plane(columns.tocsc(), fixed, within.rods.axes)

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from support.evaluations import Problem, dense
-from support.sample_scenes import ball, contact, layer, rod, scene
+from support.evaluations import HESSIAN_LIMIT, Problem, dense
+from support.sample_scenes import GEL, ball, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.log.messages.description_text import from_text, to_text
@@ -38,6 +38,7 @@ def nodes_of(simulator, start=0, edges=EDGES):
         [
             np.roll(simulator.positions[s.first_node + 1 : s.first_node + edges + 1], start, axis=0)
             for s in simulator.model.strands
+            if s.closed
         ]
     )
 
@@ -165,6 +166,61 @@ def test_the_step_of_newton_is_that_of_the_whole_matrix_of_a_ring(model, dimensi
     found = np.linalg.lstsq(problem.basis, step, rcond=None)[0] / problem.scale
     assert found == pytest.approx(expected, abs=1e-9 * np.abs(expected).max())
     assert dense(problem.evaluator.problem.system.band, 4)[0, 1:].any() is np.False_  # rows of joins are the identity's
+
+
+def wide_ring_at_a_strip(start=0, edges=24):
+    """A wide ring of unlike layers, and beside its foremost station the face of a strip."""
+    unlike = [layer("outer"), layer("inner", material="paper")]
+    beside = (RADIUS + 2e-3, 0, -0.011)
+    strip = rod([layer()], 0.02, 9, beside, "strip", 5e-3, normal=(1, 0, 0), clamp_start="wall")
+    strip["path"]["direction"] = [0, 0, 1]
+    return scene(
+        [ring(unlike, start, edges) | {"width": 6e-3}, strip],
+        EXACT,
+        bodies=[fixed(position=beside)],
+        gravity=[20, 0, 0],
+        contact=contact(barrier_distance=2e-3, coefficient=0.3, speed_threshold=10.0) | {"rods": True},
+        materials={"gel": GEL, "paper": {**GEL, "youngs_modulus": 2e7}},
+    )
+
+
+@DIMENSIONS
+def test_the_step_of_newton_is_right_where_a_wide_ring_closes_at_a_strip(dimension):
+    rng = np.random.default_rng(3)
+    problem = Problem(
+        wide_ring_at_a_strip(), rng, "laminate", dimension, h=1e-5, noise=1e-6, origin_noise=1e-7, turns=1e-4
+    )
+    evaluator, scale, joins = problem.evaluator, problem.scale, problem.model.joins
+    forces = evaluator.evaluate(problem.at, second=True)
+    assert forces["rod barrier"] > 0.0 and forces["rod friction"] > 0.0
+    assert set(evaluator.problem.rod_contact.contacts.node[:, 1]) >= {0, 23}  # on both sides of where it closes
+    joined = np.eye(len(scale))
+    joined[joins.copy] = joined[joins.first]
+    joined = joined[problem.free][:, np.setdiff1d(problem.free, joins.copy[joins.copy != joins.first])]
+    assert evaluator.factorise(problem.at) == (0.0, 0)
+    load = np.zeros(len(scale))
+    load[problem.free] = rng.standard_normal(len(problem.free)) / scale[problem.free]
+    step = problem.basis.T @ np.concatenate(
+        [part.ravel() for part in evaluator.newton_step(problem.basis @ load, np.zeros((0, 6)))]
+    )
+    wanted, errors = joined.T @ (load * scale)[problem.free], []
+    for h in (3e-9, 1e-8, 3e-8):
+        hessian = problem.differences(h)[1]
+        off = joined.T @ (0.5 * (hessian + hessian.T) @ (step / scale)[problem.free]) + wanted
+        errors.append(np.abs(off).max())
+    assert min(errors) < HESSIAN_LIMIT * np.abs(wanted).max()
+
+
+@DIMENSIONS
+def test_where_a_wide_ring_closes_changes_nothing_of_its_contact(dimension):
+    ends = []
+    for start in (0, 1, 23, 12):
+        simulator = Simulator(load_scene(wide_ring_at_a_strip(start)), dimension=dimension, dt=1e-3)
+        simulator.run(0.01)
+        ends.append(nodes_of(simulator, start, 24))
+    assert simulator.statistics.min_gap < 2e-3  # the barrier distance
+    for end in ends[1:]:
+        assert end == pytest.approx(ends[0], abs=1e-12)
 
 
 @MODELS

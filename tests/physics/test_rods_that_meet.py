@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from support.sample_scenes import GROUND, contact, fixed, layer, rod, scene
+from support.sample_scenes import GEL, GROUND, contact, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import PenetrationError
+from bilayer_core.testing import run_scene
 from bilayer_core.testing.gaps import GapCheck
 
 D_HAT = 1e-3
@@ -82,6 +83,29 @@ def test_a_ribbon_thrown_sideways_at_the_edge_of_another_does_not_pass(speed, di
         smallest = min(smallest, judge.smallest(moment))
         assert judge.crossed(moment) == ""
     assert -judge.unsure < smallest < 2e-4  # they met
+
+
+@pytest.mark.parametrize("model", ["laminate", "two_rod"])
+def test_linked_rings_of_unlike_layers_hang_in_each_other_with_their_faces(model):
+    unlike, rings = [layer("outer"), layer("inner", thickness=2e-4, material="paper")], []
+    for name, start, along, inward in (
+        ("held", (0, 0, 0.015), (1, 0, 0), (0, 0, -1)),
+        ("hung", (0.03, 0, 0), (0, 1, 0), (-1, 0, 0)),
+    ):
+        arc = {"shape": "arc", "start": start, "direction": along, "radius": 0.015, "angle": "360 deg", "closed": True}
+        rings.append(rod(unlike, stations=41, name=name, width=5e-3, normal=list(inward)) | {"path": arc})
+    content = scene(
+        rings,
+        contact=contact(2e-4),
+        damping={"mass": 5.0},
+        gravity=[0, 0, -9.81],
+        obstacles=[{"name": "ground", "type": "plane", "point": [0, 0, -0.02], "normal": [0, 0, 1]}],
+        materials={"gel": GEL, "paper": {**GEL, "youngs_modulus": 1e8}},
+        solver={"dt": None},
+    )
+    run = run_scene(content, 0.2, model=model)
+    run.assert_sound()
+    assert 0.0 < run.smallest_gap < 2e-4
 
 
 def curling(stations=46, **more):

@@ -9,6 +9,9 @@ others,
 
 so nothing is left out and nothing depends on where the join is. These are two nodes and the edge between them for each
 strand: seven unknowns in space, four in a plane, and the cost stays linear in the number of nodes.
+
+With rails (`contact.rails`) the node after these and the edge before it have columns, too, though they are in the band
+once: a contact couples them with the node and the edge before the join, at the other end of the band.
 """
 
 from __future__ import annotations
@@ -28,7 +31,8 @@ def move_joins_to_border(p):
     add_columns(bordered, count, False)
     for k in range(count):
         _move_row(joins.column, bordered, band, strands.size, bandwidth, base, k, joins.first[k])
-        _move_row(joins.column, bordered, band, strands.size, bandwidth, base, k, joins.copy[k])
+        if joins.copy[k] != joins.first[k]:
+            _move_row(joins.column, bordered, band, strands.size, bandwidth, base, k, joins.copy[k])
     hold_unknowns(joins.first, 1, bandwidth, band)
     hold_unknowns(joins.copy, 1, bandwidth, band)
     return READY
@@ -56,7 +60,7 @@ def gather_joins(joins, freedom, bordered, right):
     base = freedom.shape[1]
     for k in range(joins.first.shape[0]):
         first, copy = joins.first[k], joins.copy[k]
-        bordered.load[base + k] = right[first] + right[copy]
+        bordered.load[base + k] = right[first] + (right[copy] if copy != first else 0.0)
         right[first] = right[copy] = 0.0
 
 

@@ -120,7 +120,7 @@ def _list_rails(columns, rails, rate, strands, contacts, c, e, side):
     axes, dimension, first = strands.axes, strands.axes.shape[0], contacts.node[c, side]
     begin = side * (columns.unknown.shape[1] // 2)
     turns = begin + 4 * dimension
-    own, before = rails.node_edges[first, 1], rails.node_edges[first, 0]
+    own, before = rails.node_edges[first, 1], rails.node_edges[rails.node[first], 0]
     after = rails.node_edges[first + 1, 1]
     right = contacts.right[c, side]
     raised = right >= 0 or has_arm(rails, first) or has_arm(rails, first + 1)
@@ -234,7 +234,9 @@ def _write_entries(columns, c, a, begin, end, out):
 
 @kernel
 def _add_own_sides(columns, band):
-    """Add the blocks of either side of each contact by itself to the band."""
+    """Add the blocks of either side of each contact by itself to the band, but what is beyond it where a closed rod
+    closes: `_add_far`.
+    """
     half, entries = columns.unknown.shape[1] // 2, stack_vector(MOST_OF_SIDE)
     for c in range(columns.contacts):
         for side in range(2):
@@ -246,7 +248,7 @@ def _add_own_sides(columns, band):
                 _write_entries(columns, c, a, begin, a + 1, entries)
                 for b in range(begin, a + 1):
                     column = columns.unknown[c, b]
-                    if column >= 0:
+                    if column >= 0 and abs(row - column) < band.shape[1]:
                         band[min(row, column), abs(row - column)] += entries[b - begin]
 
 
@@ -421,6 +423,8 @@ def move_to_border(p):
     add_columns(bordered, count, True)
     _move_from_band(columns, bordered, strands, base, p.system.band)
     _add_between(columns, p.joins, p.bodies.freedom, bordered, base)
+    if p.joins.exists:
+        _add_far(columns, p.joins, p.bodies.freedom, bordered, base, p.system.band.shape[1])
     return True
 
 
@@ -473,13 +477,37 @@ def _add_between(columns, joins, freedom, bordered, base):
                 if column < 0 or attached[column] >= 0:
                     continue
                 other, value = _column(columns, joins, freedom, base, column), entries[b - half + begin]
-                if own >= 0 and other >= 0:
-                    bordered.schur[own, other] += value
-                    bordered.schur[other, own] += value
-                elif own >= 0:
-                    add_to_column(bordered, own, column, value)
-                else:
-                    add_to_column(bordered, other, row, value)
+                _add_twice(bordered, own, other, row, column, value)
+
+
+@kernel
+def _add_twice(bordered, own, other, row, column, value):
+    """Add an entry and its mirror image to border and corner; at least one of the two unknowns has a column there."""
+    if own >= 0 and other >= 0:
+        bordered.schur[own, other] += value
+        bordered.schur[other, own] += value
+    elif own >= 0:
+        add_to_column(bordered, own, column, value)
+    else:
+        add_to_column(bordered, other, row, value)
+
+
+@kernel
+def _add_far(columns, joins, freedom, bordered, base, beyond):
+    """Add those entries of sides by themselves whose unknowns are `beyond` or more from each other in the band: where a
+    closed rod closes, one of the two has a join column.
+    """
+    half = columns.unknown.shape[1] // 2
+    for c in range(columns.contacts):
+        for side in range(2):
+            for a in range(side * half, (side + 1) * half):
+                row = columns.unknown[c, a]
+                for b in range(side * half, a):
+                    column = columns.unknown[c, b]
+                    if row >= 0 and column >= 0 and abs(row - column) >= beyond:
+                        own = _column(columns, joins, freedom, base, row)
+                        other = _column(columns, joins, freedom, base, column)
+                        _add_twice(bordered, own, other, row, column, _entry(columns, c, a, b))
 
 
 @kernel

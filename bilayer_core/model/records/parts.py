@@ -157,7 +157,7 @@ class Joins:
     """Unknowns of nodes and edges that closed rods have twice; see `engine.linear.closed_rods`."""
 
     first: Indices  # rows of the matrix
-    copy: Indices  # that move as these
+    copy: Indices  # that move as these, or the same row if it is there once
     column: Indices  # of each row among the join columns, −1 without one
 
 
