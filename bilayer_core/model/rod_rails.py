@@ -16,8 +16,8 @@ Array = np.ndarray
 def build_rails(found: Collected, ribbons: set[str]) -> Rails:
     """Return the record, absent if the rails are the nodes.
 
-    The first rails of a closed strand are those of the copy of its first node (`model.strand_arrays`), which has an edge
-    on either side.
+    The first rails of a closed strand are those of the copy of its first node (`model.strand_arrays`), which has an
+    edge on either side.
 
     Parameters
     ----------

@@ -1,14 +1,15 @@
 """The smallest gap of a scene, and whether anything passed through anything: found anew from positions alone.
 
 Nothing here is shared with the solver but the geometry of the scene: what has which thickness, which radius, which
-half edges. All pairs are looked at, without lists of near ones, but for robots of thousands of edges, whose near pairs
-scipy's k-d tree finds anew at every look; distances are computed by other formulas.
+half edges. All pairs are looked at, without lists of near ones, but for robots of hundreds of edges, whose near pairs
+scipy's k-d tree finds anew at every look; distances are computed by other formulas. Rods may meet unless the scene has
+`contact.rods: false`, whether or not the model expects it.
 
 - Surfaces are met by ribbons as they are (`testing.ribbons`), by balls, and by the corners and rims of bodies
   (`testing.surfaces`).
 - Rods meet rods as ribbons straight between stations, and those up to twice as wide as thick as round ones about the
-  middle between their faces. On one rod, edges count that are at least as far apart along it as the model's own
-  exclusion (`model.rod_surfaces`).
+  middle between their faces. On one rod, edges count that are at least two edges apart along it, and half the
+  circumference of a bend that closes the barrier distance in.
 
 The model keeps points apart, not all between them: surfaces may be nearer than it knows by `UNSURE` of the barrier
 distance, and rods, whose points are no farther apart than their radius, by √(4 + 1/4) − 2 of that where two cross.
@@ -29,17 +30,18 @@ import numpy as np
 from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
-from bilayer_core.model.colliders import meets_with_borders
 from bilayer_core.model.model import Model
 from bilayer_core.observed.frame import Frame
 from bilayer_core.testing.ribbons import Ribbons, Sheet
 from bilayer_core.testing.surfaces import BodyPoints, surfaces_of
 
 Array = np.ndarray
-MOST_PAIRS = 45_000
-"""Pairs of edges that every step is checked for: those of 300 nodes."""
-MOST_EDGES = 2000
+MOST_EDGES = 300
 """Of which all pairs are listed."""
+FAR = 10.0
+"""Barrier distances up to which near pairs are found."""
+ROUND = 2.0
+"""Width over thickness up to which sections meet each other as round ones."""
 MOST_PARTS = 24
 """Into which the way of a step is cut at most."""
 LARGEST_TURN = 0.3
@@ -65,20 +67,17 @@ class GapCheck:
 
     Attributes
     ----------
-    every : int
-        Number of steps from one look to the next: 1 but for scenes with very many pairs.
     unsure : float
         By how much the smallest gap may be less than what the model knows [m].
     """
 
     def __init__(self, model: Model):
         self._model = model
-        self._pairs = PairsOfEdges(model) if model.rod_search.exists else None
-        self.every = max(1, math.ceil(self._pairs.count / MOST_PAIRS)) if self._pairs else 1
+        self._pairs = PairsOfEdges(model) if model.scene.contact and model.scene.contact.rods is not False else None
         self._points, self._ribbons = BodyPoints(model), Ribbons(model)
         self._surfaces = surfaces_of(model, self._points)
         edge = model.rods.edge_node
-        wide = {copy.name for rod in model.scene.rods if meets_with_borders(rod) for copy in rod.copies}
+        wide = _wide_rods(model)
         self._has_width = np.zeros(len(edge))
         for strand in model.strands:
             own = slice(strand.first_edge, strand.first_edge + strand.node_count - 1)
@@ -89,16 +88,18 @@ class GapCheck:
             self._leave_out_joined(self._ribbons.sections_of(model.start_position, model.start_director1))
         contact = model.scene.contact
         self.unsure = UNSURE[0] * contact.barrier_distance if contact is not None else 0.0
-        if self._pairs:
+        if model.rod_search.exists:
             self.unsure = max(self.unsure, UNSURE[1] * float(self._ribbons.radius.max()))
         self._before: Moment | None = None
 
     def _leave_out_joined(self, start: Array) -> None:
-        """Leave out pairs of edges that touch at the start, of rods that one body holds side by side."""
-        rods, (first, second) = self._model.rod_search, self._pairs.at(start[0])
-        joined = rods.rod_joined[rods.edge_rod[first], rods.edge_rod[second]]
+        """Leave out pairs of edges that touch at the start, of rods that one body holds side by side, and at sharp
+        corners of a rod.
+        """
+        first, second = self._pairs.at(start[0])
         gaps, _ = self._rod_gaps(self._ribbons.sheet(start).straight(self._has_width), first, second)
-        self._pairs.leave_out(start[0], joined & (gaps < self._model.scene.contact.barrier_distance))
+        joined = self._pairs.joined(first, second) & (gaps < self._model.scene.contact.barrier_distance)
+        self._pairs.leave_out(start[0], joined | (self._pairs.of_one_rod(first, second) & (gaps <= 0.0)))
 
     @property
     def checks_anything(self) -> bool:
@@ -127,7 +128,8 @@ class GapCheck:
             unit, (first, second) = self._model.scene.contact.barrier_distance, self._pairs.at(at.sections[0])
             bound, _ = cores.apart_at_least(first, second)
             near = bound < unit
-            gaps += [float(bound[~near].min(initial=math.inf)), cores.apart(first[near], second[near], unit, unit)]
+            far = math.inf if self._pairs.has_all else FAR * unit
+            gaps += [float(bound[~near].min(initial=far)), cores.apart(first[near], second[near], unit, unit)]
         return min(gaps + self._surface_gaps(sheet, at, math.inf))
 
     def crossed(self, at: Moment) -> str:
@@ -210,13 +212,23 @@ def _largest(way: Array) -> float:
     return float(np.linalg.norm(way, axis=1).max()) if len(way) else 0.0
 
 
+def _wide_rods(model: Model) -> set[str]:
+    """Return the names of rods that are somewhere wider than so many times their thickness."""
+    width, thickness = {}, {}
+    for strand in model.strands:
+        stations = strand.first_station + np.arange(strand.node_count)
+        for station, wide, thick in zip(stations.tolist(), strand.width, strand.thickness, strict=True):
+            key = strand.rod, station
+            width[key], thickness[key] = wide, thickness.get(key, 0.0) + thick
+    return {key[0] for key, wide in width.items() if wide > ROUND * thickness[key] * (1.0 + 1e-9)}
+
+
 class PairsOfEdges:
     """The pairs of edges of a model that may not come together, all of them or, of very many, those that are near.
 
     Parameters
     ----------
     model : Model
-        In which rods meet.
     most : int
         Number of edges up to which all pairs are listed.
 
@@ -224,25 +236,48 @@ class PairsOfEdges:
     ----------
     count : int
         Of pairs; of very many edges, of all that there are.
+    has_all : bool
+        Whether all are listed.
     """
 
     def __init__(self, model: Model, most: int = MOST_EDGES):
-        self._model, self._edges = model, len(model.rod_search.edge_rod)
+        self._model, self._edges = model, len(model.rods.edge_node)
+        scene = model.scene
+        rods = [(copy.name, copy.rod) for rod in scene.rods for copy in rod.copies]
+        number = {name: index for index, (name, _) in enumerate(rods)}
+        self._rod, self._arc = np.full(self._edges, -1), np.zeros(self._edges)  # −1: copies of others
+        thick = np.zeros(len(rods))
+        for strand in model.strands:
+            index, edges = number[strand.rod], np.arange(strand.shown - 1)
+            self._rod[strand.first_edge + edges] = index
+            self._arc[strand.first_edge + edges] = rods[index][1].edge_length * (strand.first_station + edges)
+            thick[index] += float(strand.thickness.max())
+        self._edge_length = np.array([rod.edge_length for _, rod in rods])
+        self._length = np.array([rod.path.length if rod.closed else math.inf for _, rod in rods])
+        bend = 0.5 * math.pi * (thick + scene.contact.barrier_distance)
+        self._exclusion = np.maximum(bend, 2.0 * self._edge_length) * (1.0 - 1e-9)
+        holds = [{rod.clamp_start, rod.clamp_end} - {None} for _, rod in rods]
+        self._joined = np.array([[bool(one & other) for other in holds] for one in holds])
+        np.fill_diagonal(
+            self._joined,
+            [len(held) == 1 and rod.clamp_start == rod.clamp_end for held, (_, rod) in zip(holds, rods, strict=True)],
+        )
         self._all: tuple[Array, Array] | None = None
         self._left_out = np.empty(0, dtype=np.int64)
         self.count = self._edges * (self._edges - 1) // 2
-        if self._edges <= most:
+        self.has_all = self._edges <= most
+        if self.has_all:
             self._all = self._allowed(*np.triu_indices(self._edges, 1))
             self.count = len(self._all[0])
 
     def at(self, nodes: Array) -> tuple[Array, Array]:
-        """Return two arrays of edges, all pairs that may be nearer than the barrier distance among them; nodes [m]."""
+        """Return two arrays of edges, all pairs that may be near among them; nodes [m]."""
         if self._all is not None:
             return self._all
         edge = self._model.rods.edge_node
         middle, along = 0.5 * (nodes[edge] + nodes[edge + 1]), nodes[edge + 1] - nodes[edge]
         reach = np.linalg.norm(along, axis=1).max() + 2.0 * max(float(s.width.max()) for s in self._model.strands)
-        reach += self._model.scene.contact.barrier_distance
+        reach += FAR * self._model.scene.contact.barrier_distance
         near = KDTree(middle).query_pairs(reach, output_type="ndarray")
         first, second = self._allowed(near[:, 0], near[:, 1])
         keep = ~np.isin(self._number(first, second), self._left_out)
@@ -256,25 +291,26 @@ class PairsOfEdges:
         else:
             self._left_out = self._number(first[out], second[out])
 
+    def of_one_rod(self, first: Array, second: Array) -> Array:
+        """Return whether two edges belong to one rod."""
+        return self._rod[first] == self._rod[second]
+
+    def joined(self, first: Array, second: Array) -> Array:
+        """Return whether one body holds the rods of two edges, or both ends of their rod."""
+        return self._joined[self._rod[first], self._rod[second]]
+
     def length_between(self, first: Array, second: Array) -> Array:
         """Return the length of rod between two edges [m], infinite between rods."""
-        surfaces = self._model.rod_search
-        same = surfaces.edge_rod[first] == surfaces.edge_rod[second]
-        arc = surfaces.edge_arc.mean(axis=1)
-        return np.where(same, np.abs(arc[first] - arc[second]), math.inf)
+        return np.where(self.of_one_rod(first, second), np.abs(self._arc[first] - self._arc[second]), math.inf)
 
     def _number(self, first: Array, second: Array) -> Array:
         return np.minimum(first, second) * self._edges + np.maximum(first, second)
 
     def _allowed(self, first: Array, second: Array) -> tuple[Array, Array]:
         """Return those pairs that may not come together."""
-        surfaces = self._model.rod_search
-        rod_a, rod_b = surfaces.edge_rod[first], surfaces.edge_rod[second]
-        arc, length = surfaces.edge_arc.mean(axis=1), surfaces.rod_length[rod_a]
-        apart = np.abs(arc[first] - arc[second])
+        rod, same = self._rod[first], self.of_one_rod(first, second)
+        apart, length = np.abs(self._arc[first] - self._arc[second]), self._length[rod]
         around = np.where(np.isfinite(length), np.minimum(apart, length - apart), apart)
-        edge = surfaces.edge_arc[:, 1] - surfaces.edge_arc[:, 0]
-        same = rod_a == rod_b
-        far = around - 0.5 * (edge[first] + edge[second]) >= surfaces.rod_exclusion[rod_a]
-        keep = surfaces.rod_can_collide[rod_a, rod_b] & (~same | far)
+        far = around - self._edge_length[rod] >= self._exclusion[rod]
+        keep = (rod >= 0) & (self._rod[second] >= 0) & (~same | far)
         return first[keep], second[keep]

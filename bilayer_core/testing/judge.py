@@ -57,7 +57,7 @@ class Judge:
     ----------
     simulator : Simulator
     every : int
-        From look to look, for very long runs; scenes with very many pairs of edges are looked at less often as well.
+        From look to look, for very long runs.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Judge:
 
     def __init__(self, simulator: Simulator, every: int = 1):
         self._simulator, self._gaps = simulator, GapCheck(simulator.model)
-        self._every = max(every, self._gaps.every)
+        self._every = every
         self.steps, self.min_gap = 0, math.inf
         self.energy_gain = self.numerical = self.momentum = self._made = 0.0
         self._lowest = float(simulator.energy_account[FREE])

@@ -113,13 +113,15 @@ def slide_on_a_ribbon() -> tuple[float, float]:
 
 
 def overlap(config: dict, time: float, looks: int) -> tuple[float, float]:
-    """Return how deep rods go into each other, as rectangles with round borders, at some moments of a run [mm]; 0."""
+    """Return how deep rods go into each other, as rectangles with round borders, at some moments of a run, or how far
+    beyond the barrier distance they stay [mm]; 0.
+    """
     simulator = Simulator(load_scene(config))
     judge, least = GapCheck(simulator.model), math.inf
     for _ in range(looks):
         simulator.run(time / looks)
         least = min(least, judge.smallest(judge.moment(simulator.frame())))
-    return 1e3 * max(-least, 0.0), 0.0
+    return 1e3 * max(-least, least - config["contact"]["barrier_distance"], 0.0), 0.0
 
 
 def petals() -> tuple[float, float]:
@@ -147,7 +149,7 @@ def roll() -> tuple[float, float]:
     swelling = {"stimulus": "film", "gain": -0.1}
     layers = [layer("slab", 2e-3, "slab"), layer("film", 1e-4, "film", eigenstrain=swelling)]
     config = scene(
-        [rod(layers, 0.08, 81, clamp_start="wall")],
+        [rod(layers, 0.1, 81, clamp_start="wall")],
         bodies=[fixed()],
         damping={"mass": 20.0},
         stimuli={"film": {"schedule": {"type": "ramp", "start": 0, "end": 0.5, "from": 0, "to": 1}}},
