@@ -117,6 +117,14 @@ def place_of(surfaces, at, k):
 
 
 @kernel
+def stands_aside(surfaces, k):
+    """Return whether pair k is of a station where points between stations bear: it tells how far away a surface is, but
+    neither bears nor bounds steps. (At an end, the borders of those lie elsewhere, along directors extrapolated to it.)
+    """
+    return surfaces.near_weight[k] == 0.0 and surfaces.contact_point_body[surfaces.near_contact_point[k]] < 0
+
+
+@kernel
 def _note(surfaces, k, i, s, gap, node, arm, mix, radius, weight):
     """Write pair k, if there is capacity for it."""
     if k >= surfaces.near_contact_point.shape[0]:

@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import math
 
-from bilayer_core.contact.near import gap_normal, place_of
+from bilayer_core.contact.near import gap_normal, place_of, stands_aside
 from bilayer_core.contact.shapes import SPHERE
 from bilayer_core.jit import kernel
 from bilayer_core.jit.called import stack_vector
@@ -233,6 +233,8 @@ def step_bound(surfaces, strands, system, at, closing):
     alpha, blocking = 1.0, -1
     moved, rate_of_point = stack_vector(3), stack_vector(3)
     for k in range(surfaces.near_count[0]):
+        if stands_aside(surfaces, k):
+            continue
         i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
         x0, x1, x2 = place_of(surfaces, at, k)
         gap, n0, n1, n2, _, _, _ = gap_normal(surfaces, at, surfaces.near_radius[k], s, x0, x1, x2)

@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 
 from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hessian
-from bilayer_core.contact.near import gap_normal, place_of
+from bilayer_core.contact.near import gap_normal, place_of, stands_aside
 from bilayer_core.contact.shapes import shape_curvature
 from bilayer_core.forces.contact_on_bodies import add_force, add_second_derivative
 from bilayer_core.forces.restitution import RESTITUTION, damping_at
@@ -71,6 +71,8 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
         x = place_of(surfaces, at, k)
         d, n[0], n[1], n[2], p0, p1, p2 = gap_normal(surfaces, at, surfaces.near_radius[k], s, x[0], x[1], x[2])
         surfaces.near_gap[k] = d
+        if d < d_hat and stands_aside(surfaces, k):
+            continue
         min_gap = min(min_gap, d)
         if d >= d_hat:
             continue
