@@ -306,8 +306,8 @@ def _on_curve(surfaces, at, i, mix):
     return rod_point(surfaces, at, i, (mix[0], mix[1], 0.0, 0.0, 0.0, 0.0))
 
 
-@kernel
-def _freeze(sliding, p, at, stage):
+@piece(bool, Sliding, Problem, Configuration, Stage)
+def freeze_surface_contacts(sliding, p, at, stage):
     """List the contacts at a configuration, with their normal forces, directions and arms; near pairs are those that
     the barrier listed. Returns whether they are the same as before.
     """
@@ -485,7 +485,7 @@ def start_surface_friction(sliding, p, start, stage):
     if sliding.acts:
         if sliding.places[0] > 0:
             sliding.spread[:, :] = False
-        _freeze(sliding, p, start, stage)
+        freeze_surface_contacts(sliding, p, start, stage)
         sliding.relaxation[0] = 0.0
     return READY
 
@@ -496,5 +496,5 @@ def settle_surface_friction(sliding, p, at, stage):
     if not sliding.acts:
         return False
     before = sliding.count[0]
-    _relax(sliding, _freeze(sliding, p, at, stage))
+    _relax(sliding, freeze_surface_contacts(sliding, p, at, stage))
     return before + sliding.count[0] > 0
