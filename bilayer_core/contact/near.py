@@ -24,7 +24,7 @@ distance, so
 
 and a ball presses on π/(2 SAG) = 31 points at most, however large it is. (Contact on flat faces has more of them, which
 is what `Surfaces.least_spacing` is for; and a strip that is bent away from a surface with the curvature κ has
-ρ = 1/(1/R + κ).) A plane, R = ∞, meets rods in such points where one is bent so much that it sinks deeper between
+ρ = 1/(1/R + κ).) A plane, R = ∞, meets rods in such points that are bent so much that it sinks deeper between
 stations; across the width it has the borders and the middle, and an end stands on it with its whole half edge, as it
 does where no points are between stations. Stations, borders and ends are points of each grid. A point stands for its
 part of the width and of the rod's length; where a ball presses, the width is that of the patch 2√(2ρd̂) within which
@@ -149,7 +149,7 @@ def _list_between(surfaces, at, s, limit, count):
     edges, section, plane = surfaces.node_edges, surfaces.section, surfaces.kind[s] == PLANE
     for i in range(edges.shape[0]):
         b, a = edges[i, 0], edges[i, 1]
-        if section[i, 3] == 0.0 or not (surfaces.edge_can_collide[s, b] or surfaces.edge_can_collide[s, a]):
+        if not surfaces.node_between[s, i] or not (surfaces.edge_can_collide[s, b] or surfaces.edge_can_collide[s, a]):
             continue
         inner, single = b != a, False
         if not inner:  # an end, which belongs to its neighbour, if that has two edges
@@ -288,7 +288,9 @@ def list_near(surfaces, at, margin):
             gap = gap_normal(surfaces, at, radius, s, x[0], x[1], x[2])[0]
             smallest = min(smallest, gap)
             if gap <= limit:
-                weight = 0.0 if between and (i < nodes or i >= placed) else surfaces.weight[i]
+                weight = surfaces.weight[i]
+                if between and (i < nodes or i >= placed) and surfaces.node_between[s, node]:
+                    weight = 0.0
                 _note(surfaces, count, i, s, gap, node, i >= placed, mix, radius, weight)
                 count += 1
         if between:

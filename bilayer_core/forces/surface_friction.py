@@ -48,6 +48,7 @@ import math
 from bilayer_core.contact.barrier import barrier_gradient
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
 from bilayer_core.contact.near import gap_normal, mix_of, place_of, rod_point
+from bilayer_core.contact.shapes import PLANE
 from bilayer_core.forces.contact_on_bodies import add_force, add_second_derivative
 from bilayer_core.forces.restitution import damping_at
 from bilayer_core.forces.rod_arms import (
@@ -416,7 +417,9 @@ def _spread(sliding, p, at, stage, count):
     for k in range(whole):
         sliding.left[k] = sliding.load[k]
     for k in range(whole):
-        if surfaces.contact_point_body[sliding.first[k]] >= 0 or surfaces.sharpest[sliding.surface[k]] >= 0.0:
+        if surfaces.contact_point_body[sliding.first[k]] >= 0 or surfaces.kind[sliding.surface[k]] != PLANE:
+            continue
+        if surfaces.node_between[sliding.surface[k], sliding.node[k]]:
             continue
         j = _next_station(sliding, surfaces, p.strands, k, whole)
         if j < 0 or count - whole + PARTS > most:

@@ -90,7 +90,11 @@ def build_contact(
 
     point_body, moved_by = np.concatenate([np.full(nodes, -1), own, free]), np.concatenate([held_by, own, free])
     section = of_rods.section
-    bend, flat = bend_of(scene), np.array([surface.shape.kind == "plane" for surface in surfaces], dtype=bool)
+    bends = {name: bend_of(scene, rod) for rod in scene.rods for name in rod.copy_names}
+    bent = np.concatenate([np.full(strand.node_count, bends[strand.rod] >= 0.0) for strand in found.strands])
+    bend = min((radius for radius in bends.values() if radius >= 0.0), default=-1.0)
+    flat = np.array([surface.shape.kind == "plane" for surface in surfaces], dtype=bool)
+    node_between = np.where(flat[:, None], bent, True) & (section[:, 3] > 0.0)
     demands = [demand_of(surface.shape, strip_area(section), bend) for surface in surfaces]
     sharpest, least_spacing = np.array(demands).reshape(-1, 2).T
     dense = bool((sharpest >= 0.0).any())
@@ -127,6 +131,7 @@ def build_contact(
         edge_length=found.column("rest_length"),
         node_can_collide=np.ascontiguousarray(of_nodes[:, used].T),
         edge_can_collide=_of_edges(found, of_sections[:, used]),
+        node_between=node_between,
         dense=dense,
         sharpest=sharpest.copy(),
         least_spacing=least_spacing.copy(),
@@ -152,7 +157,7 @@ def build_contact(
             node_axis=found.column("node_axis", np.int64),
             surface_grain=surface_grain,
             point_grain=point_grain,
-            spreads=bool((sharpest < 0.0).any()),
+            spreads=bool(flat.any() and not bent.all()),
             **friction_values(friction, point_body >= 0, surface_grain, point_grain),
         ),
         surface_names=tuple(s.collider.name for s in surfaces),

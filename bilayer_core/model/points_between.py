@@ -41,8 +41,8 @@ def strip_area(section: Array) -> float:
 
 
 def demand_of(shape: Shape, area: float, bend: float) -> tuple[float, float]:
-    """Return the least radius of what is not flat of a shape, of a plane that of rods on it (`bend_of`, −1 if none has
-    points between stations), and the least distance of points [m].
+    """Return the least radius of what is not flat of a shape, of a plane that of rods on it (`bend_of`, −1 if they are
+    met at stations), and the least distance of points [m].
 
     Points as dense as sharp edges demand would be many on large faces: their distance is such that those of rods of an
     area [m²] on a face of a box, or on the end of a cylinder, are `MOST_ON_FLAT` at most.
@@ -77,7 +77,7 @@ def points_between(model: Model, s: int, centre: Array, within: float) -> Iterat
     reach += surfaces.rod_points.longest
     flat = surfaces.kind[s] == PLANE
     is_near = flat | (np.linalg.norm(x - centre, axis=1) < reach)
-    for i in np.flatnonzero(meets[edges].any(axis=1) & (section[:, 3] > 0.0) & is_near).tolist():
+    for i in np.flatnonzero(meets[edges].any(axis=1) & surfaces.node_between[s] & is_near).tolist():
         (b, a), single = edges[i], False
         if is_end[i]:
             single = surfaces.node_part[i, 1] == 1.0 and bool(is_end[i + 1])

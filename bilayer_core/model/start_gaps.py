@@ -60,11 +60,14 @@ def surface_gaps(model: Model, within: float) -> Iterator[SurfaceGaps]:
     base = np.concatenate([bodies.start_position, np.zeros((1, 3))])[surfaces.body]
     rotation = np.concatenate([bodies.start_rotation, np.eye(3)[None]])[surfaces.body]
     everything, of_rods = np.arange(len(position)), surfaces.contact_point_body < 0
+    node = np.where(everything < model.node_count, everything, 0)
+    if surfaces.rod_points.exists:
+        node[surfaces.rod_points.first :] = surfaces.rod_points.node
     for s in range(len(model.surface_names)):
         core = Shape(_KIND[int(surfaces.kind[s])], surfaces.size[s], 0.0, rotation[s] @ surfaces.rotation[s])
         origin = base[s] + rotation[s] @ surfaces.position[s]
         meets = surfaces.can_collide[s][surfaces.group]
-        weight = np.where(of_rods & (surfaces.sharpest[s] >= 0.0), 0.0, surfaces.weight)
+        weight = np.where(of_rods & surfaces.node_between[s][node], 0.0, surfaces.weight)
         parts = [(everything[meets], position[meets], surfaces.radius[meets], weight[meets])]
         for cell in points_between(model, s, origin, within):
             parts.append((np.full(len(cell.radius), cell.node), cell.place, cell.radius, cell.weight))

@@ -155,16 +155,15 @@ def longest_edge(scene: SceneConfig, rod: Rod) -> float:
     return COARSE * float(edge_figures(scene, rod).thickness.min() + scene.contact.barrier_distance)
 
 
-def bend_of(scene: SceneConfig) -> float:
-    """Return the least radius to which rods bend between stations so that a plane comes nearer there than at them by
-    more than the part `SAG` of the barrier distance [m], −1 if none does.
+def bend_of(scene: SceneConfig, rod: Rod) -> float:
+    """Return the least radius to which a rod bends between stations so that a plane comes nearer there than at them by
+    more than the part `SAG` of the barrier distance [m], −1 if it does not.
 
     An edge of length l that is bent by κ sags by ⅛ κ l². The curvature is the largest without loads.
     """
-    deepest, largest = 8.0 * SAG * (scene.contact.barrier_distance if scene.contact else inf), 0.0
-    for rod in scene.rods:
-        curvature = edge_figures(scene, rod).curvature()
-        largest = max(largest, curvature[curvature * rod.edge_length**2 > deepest].max(initial=0.0))
+    deepest = 8.0 * SAG * (scene.contact.barrier_distance if scene.contact else inf)
+    curvature = edge_figures(scene, rod).curvature()
+    largest = float(curvature[curvature * rod.edge_length**2 > deepest].max(initial=0.0))
     return 1.0 / largest if largest > 0.0 else -1.0
 
 
@@ -173,7 +172,7 @@ def _of_points(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterator[
     shaped = [(body.name, body.surface) for body in scene.bodies if body.surface is not None]
     shaped += [(obstacle.name, obstacle) for obstacle in scene.obstacles]
     radius, distance, worst = 0.5 * float(at_edges.thickness.min()), scene.contact.barrier_distance, None
-    area, bend = float(at_edges.width.max()) * rod.path.length, bend_of(scene)
+    area, bend = float(at_edges.width.max()) * rod.path.length, bend_of(scene, rod)
     for name, surface in shaped:
         demand = demand_of(shape_of(surface), area, bend)
         if demand[0] < 0.0:  # a plane that meets stations

@@ -94,25 +94,25 @@ def test_the_points_that_kernels_make_are_those_of_the_pattern(stations, dimensi
 def test_a_plane_meets_a_bent_rod_between_stations_and_a_straight_one_at_them(dimension):
     ring = rod([layer(thickness=THICK)], stations=33, width=WIDTH)
     path = {"shape": "arc", "start": [0, 0, 0.5 * THICK + 0.5 * D_HAT], "direction": [1, 0, 0], "closed": True}
-    ring |= {"path": path | {"radius": 0.05, "angle": "360 deg"}, "normal": [0, 0, 1]}
-    straight = rod([layer(thickness=THICK)], stations=33, width=WIDTH, start=(0, 0, 0.5 * THICK + 0.5 * D_HAT))
+    ring |= {"name": "ring", "path": path | {"radius": 0.05, "angle": "360 deg"}, "normal": [0, 0, 1]}
+    straight = rod([layer(thickness=THICK)], stations=33, width=WIDTH, start=(0.2, 0, 0.5 * THICK + 0.5 * D_HAT))
     ground = {"obstacles": [{"name": "ground", "type": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]}]}
-    for strip, spaced in ((ring, True), (straight, False)):
-        content = scene([strip], contact=contact(D_HAT), materials=WIDE, **ground)
-        simulator = Simulator(load_scene(content), dimension=dimension, dt=1e-7)
-        simulator.run(1e-7)
-        listed = simulator._stepper.engine._storage.problem.surfaces
-        own = slice(int(listed.near_count[0]))
-        pressed = (listed.near_gap[own] < D_HAT) & (listed.near_weight[own] > 0.0)
-        found = sorted(zip(listed.near_gap[own][pressed], listed.near_weight[own][pressed], strict=True))
-        cells = list(points_between(simulator.model, 0, np.zeros(3), 1.0))
-        if spaced:
-            places = [(cell.place[:, 2] - cell.radius, cell.weight) for cell in cells]
-            expected = [(d, w) for gaps, weights in places for d, w in zip(gaps, weights, strict=True) if d < D_HAT]
-            assert sum(cell.weight.sum() for cell in cells) == pytest.approx(listed.edge_length[:32].sum(), rel=1e-12)
-            assert len(found) > 3 and np.array(found) == pytest.approx(np.array(sorted(expected)), rel=1e-6, abs=1e-8)
-        else:
-            assert cells == [] and sum(weight for _, weight in found) == pytest.approx(LENGTH, rel=1e-12)
+    content = scene([ring, straight], contact=contact(D_HAT), materials=WIDE, **ground)
+    simulator = Simulator(load_scene(content), dimension=dimension, dt=1e-7)
+    simulator.run(1e-7)
+    listed = simulator._stepper.engine._storage.problem.surfaces
+    own, of_ring = slice(int(listed.near_count[0])), simulator.model.strands[0].node_count
+    pressed = (listed.near_gap[own] < D_HAT) & (listed.near_weight[own] > 0.0)
+    bent = pressed & (listed.near_node[own] < of_ring)
+    found = sorted(zip(listed.near_gap[own][bent], listed.near_weight[own][bent], strict=True))
+    cells = list(points_between(simulator.model, 0, np.zeros(3), 1.0))
+    places = [(cell.place[:, 2] - cell.radius, cell.weight) for cell in cells]
+    expected = [(d, w) for gaps, weights in places for d, w in zip(gaps, weights, strict=True) if d < D_HAT]
+    assert sum(cell.weight.sum() for cell in cells) == pytest.approx(listed.edge_length[:32].sum(), rel=1e-12)
+    assert len(found) > 3 and np.array(found) == pytest.approx(np.array(sorted(expected)), rel=1e-6, abs=1e-8)
+    at_stations = pressed & ~bent
+    assert not listed.near_mix[own][at_stations, :2].any()
+    assert listed.near_weight[own][at_stations].sum() == pytest.approx(LENGTH, rel=1e-12)
 
 
 def test_a_ball_that_starts_inside_a_strip_beside_its_borders_and_middle_is_refused():

@@ -54,6 +54,7 @@ class Surfaces:
     can_collide: FlagTable  # whether contact points of a group can meet it, shape (n_surface, n_group)
     node_can_collide: FlagTable  # whether a station can meet it, shape (n_surface, n_node)
     edge_can_collide: FlagTable  # whether what is between two can, shape (n_surface, n_edge)
+    node_between: FlagTable  # whether points beside a station meet it, shape (n_surface, n_node)
     dense: bool  # whether points between stations meet one
     sharpest: Vector  # least radius of what is not flat, −1 if all is [m], shape (n_surface,)
     least_spacing: Vector  # of points between stations [m], shape (n_surface,)
