@@ -8,6 +8,7 @@ from enum import IntEnum
 import numpy as np
 
 from bilayer_core.model.section import outline
+from bilayer_core.model.validity import bend_of
 from bilayer_core.scene.body import Body, Prescribed
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.profile import values_at
@@ -141,13 +142,16 @@ def _is_ribbon(rod: Rod, times: float) -> bool:
 
 def _points_of_rods(scene: SceneConfig, dimension: int, kind: str) -> str:
     """Return which points of rods meet a surface, and what a plane leaves out."""
-    along = "nodes" if kind == "plane" else "points along rods"
+    bent = kind == "plane" and any(bend_of(scene, rod) >= 0.0 for rod in scene.rods)
+    between = ", and points between them where rods are bent," if bent else ""
+    along = f"nodes{between}" if kind == "plane" else "points along rods"
     if not any(is_ribbon(rod) for rod in scene.rods):
         return f"{along} against {kind}"
     if dimension == 3:
-        return f"{'nodes and borders of' if kind == 'plane' else 'points all over'} ribbons against {kind}"
+        ribbons = f"nodes and borders of ribbons{between}" if kind == "plane" else "points all over ribbons"
+        return f"{ribbons} against {kind}"
     if kind == "plane":
-        return f"nodes against {kind}; borders of ribbons touch as they do"
+        return f"{along} against {kind}; borders of ribbons touch as they do"
     return (
         f"{along} against {kind}; where it is not the same across, a plane leaves out that borders of ribbons touch "
         "later"
