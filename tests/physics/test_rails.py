@@ -155,7 +155,7 @@ def test_a_step_that_moves_and_turns_rods_keeps_a_part_of_every_gap_up_to_its_bo
             fraction = problem.evaluator.bound(problem.at, *parts).fraction
         assert 0.0 < fraction <= 1.0
         cut += fraction < 1.0
-        for part in np.linspace(0.0, fraction, 30):
+        for part in np.linspace(0.0, fraction, 10):
             problem.move(problem.at, part * size * step, problem.trial)
             kept = gaps(problem, problem.trial) / np.minimum(before, FAR * d_hat)
             assert kept.min() >= KEPT_FRACTION * (1.0 - 1e-9)
