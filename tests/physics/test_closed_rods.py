@@ -56,11 +56,13 @@ def test_a_ring_starts_without_stress_and_stays(layers, model, dimension):
 
 LIGHT = {"light": {"minimum": 0, "maximum": 1, "schedule": {"type": "hold", "value": 1.0}}}
 LIT = layer("bottom", eigenstrain={"stimulus": "light", "gain": 0.05, "time_constant": 0.01})
+BALL = {"name": "ball", "type": "sphere", "position": [0, 0, -RADIUS - 6.6e-3], "radius": 5e-3}
 GROUND = {"name": "ground", "type": "plane", "point": [0, 0, -RADIUS - 2.2e-3], "normal": [0.05, 0, 1]}
 SURROUNDINGS = {
     "weight, masses and loads": {},
     "eigenstrain": {"stimuli": LIGHT},
     "ground with friction": {"contact": contact(barrier_distance=1e-3, coefficient=0.3), "obstacles": [GROUND]},
+    "ball with friction": {"contact": contact(barrier_distance=1e-3, coefficient=0.3), "obstacles": [BALL]},
     "a stream": {"fluid": {"drag_along": 0.1, "drag_across": 2.0, "velocity": [0.1, 0, 0.05], "added_mass": True}},
     "itself": {"contact": contact(barrier_distance=1e-3, coefficient=0.3) | {"rods": True}, "damping": {"mass": 300.0}},
     "viscosity": {"damping": {"mass": 1.0}},
