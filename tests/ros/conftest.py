@@ -10,7 +10,7 @@ import pytest
 import rclpy
 from rcl_interfaces.srv import GetParameters, GetParameterTypes, SetParameters
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
@@ -101,11 +101,11 @@ class Client:
 
     def drain(self, quiet=0.1):
         """Receive what is on its way, until nothing has come for `quiet` seconds; of a paused node that is soon."""
-        last = time.monotonic()
-        while (now := time.monotonic()) - last < quiet:
-            self._executor.spin_once(timeout_sec=quiet / 2)
-            if time.monotonic() - now < quiet / 4:
-                last = time.monotonic()
+        with suppress(TimeoutException):
+            while True:
+                serve, _, _ = self._executor.wait_for_ready_callbacks(timeout_sec=quiet)
+                serve()
+                serve.result()
 
     def listen(self, message_type, topic) -> list:
         """A list that grows with every message; it has one already."""
