@@ -104,10 +104,11 @@ def _parts(scene) -> dict[str, list[str]]:
             for end, key in (("start", "clamp_start"), ("end", "clamp_end"))
             if (names := {name: None for copy in rod.copies if (name := getattr(copy.rod, key))})
         ]
+        rubs = _friction(scene, rod, "its axis" if rod.friction is not None else "")
         shape = f"{rod.path.describe()}, " if rod.path.describe() else ""
         free = "no ends" if rod.closed else "both ends free"
         lines = [
-            f"{copies}{shape}{section}, {stations}; {', '.join(held) or free}",
+            f"{copies}{shape}{section}, {stations}; {', '.join(held) or free}{rubs}",
             f"bottom to top: {layers}",
         ]
         if rod.pattern and (rod.pattern.stimuli or rod.pattern.gains):
@@ -127,11 +128,12 @@ def _parts(scene) -> dict[str, list[str]]:
         parts[rod.name] = lines
     for body in scene.bodies:
         surface = f", {body.surface.shape}" if body.surface else ""
-        parts[body.name] = [f"{body.motion.describe()}{surface}{_grain(scene, body.surface)}"]
+        parts[body.name] = [f"{body.motion.describe()}{surface}{_friction(scene, body, _axis(scene, body.surface))}"]
     for joint in scene.joints:
         resisted = resistance(joint.turning, joint.sliding)
         parts[f"joint {joint.name}"] = [f"{joint.type} of {' and '.join(joint.bodies)}{resisted}"]
-    parts |= {obstacle.name: [f"{obstacle.type}, fixed{_grain(scene, obstacle)}"] for obstacle in scene.obstacles}
+    for obstacle in scene.obstacles:
+        parts[obstacle.name] = [f"{obstacle.type}, fixed{_friction(scene, obstacle, _axis(scene, obstacle))}"]
     return parts
 
 
@@ -143,19 +145,24 @@ def _light(channel) -> str:
     return f", light from {_vector(channel.light.from_direction)}; faces turned away are dark, others {hidden}"
 
 
-def _grain(scene, surface) -> str:
-    """Return how friction on a surface differs with the direction, as the rest of a sentence."""
-    law = scene.contact.friction if scene.contact is not None else None
-    if surface is None or law is None or not law.acts:
+def _friction(scene, part, axis: str) -> str:
+    """Return the coefficients of a part's own, or those along an axis if it has one, as the rest of a sentence."""
+    law, own = scene.contact.friction if scene.contact is not None else None, part.friction
+    holds = law if own is None else own
+    if own is None and not (axis and law is not None and law.acts):
         return ""
-    if surface.grain is not None:
-        axis = f"its grain, {_vector(surface.grain)} in its frame"
-    elif law.axis is not None:
-        axis = f"{_vector(law.axis)} in the world"
-    else:
-        return ""
-    forward, backward, sideways = law.of_rods
+    if not axis or not (own is None or own.directed):
+        return f", friction {holds.coefficient:g}"
+    forward, backward, sideways = holds.each_way
     return f", friction {forward:g} along {axis}, {backward:g} against it, {sideways:g} sideways"
+
+
+def _axis(scene, surface) -> str:
+    """Return the direction by which friction on a surface differs; empty without one."""
+    law = scene.contact.friction if scene.contact is not None else None
+    if surface is not None and surface.grain is not None:
+        return f"its grain, {_vector(surface.grain)} in its frame"
+    return f"{_vector(law.axis)} in the world" if surface is not None and law is not None and law.axis else ""
 
 
 def _vector(components) -> str:

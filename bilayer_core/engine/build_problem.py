@@ -8,12 +8,13 @@ import numpy as np
 
 from bilayer_core.contact.broad_phase import RodSearch
 from bilayer_core.forces.restitution import damping_of
+from bilayer_core.model.friction_pairs import friction_of_rods, slides
 from bilayer_core.model.lit_elements import light_of
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.contacts import ContactColumns, Rails, Restitution, RodContact, RodContactList, Slips
 from bilayer_core.model.records.parts import PointForces
 from bilayer_core.model.records.problem import Border, System
-from bilayer_core.scene.config import Friction
+from bilayer_core.scene.friction import Friction
 
 Array = np.ndarray
 AS_BUILT = ("viscosity", "drives", "bonds", "joins", "constrained", "attachments")
@@ -80,7 +81,7 @@ def restitution_of(model: Model, sizes: dict[str, int]) -> Restitution:
 def slips_of(model: Model, sizes: dict[str, int]) -> Slips:
     """Return the record of slips, absent if nothing slides against friction."""
     law = model.scene.contact.friction if model.scene.contact else None
-    if law is None or not law.acts:
+    if not slides(model.scene, law):
         return Slips.absent()
     return Slips.zeros(sizes)
 
@@ -98,13 +99,14 @@ def rod_contact_of(
     """Return the record of contacts of rods, with those of `now` and the `old` ones of the start of a stage; `law` is
     the scene's or one with other coefficients, `motion` that of the list of near rods.
     """
-    contact = model.scene.contact
+    contact, coefficient = model.scene.contact, friction_of_rods(model.scene, law)
     return RodContact.zeros(
         sizes,
         d_hat=contact.barrier_distance,
         stiffness=model.contact_stiffness,
-        slides=law is not None and law.acts and law.coefficient > 0.0,
-        coefficient=law.coefficient if law is not None else 0.0,
+        slides=bool(coefficient.max() > 0.0),
+        coefficient=coefficient,
+        rod=model.sliding.owner[: model.node_count].copy(),
         threshold=law.speed_threshold if law is not None else 1.0,
         unit=contact.barrier_distance + 2.0 * float(search.edge_radius.max()),
         point_weight=model.rod_point_weight,

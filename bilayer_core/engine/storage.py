@@ -25,6 +25,7 @@ from bilayer_core.forces.friction_limit import PATH_SIZE
 from bilayer_core.forces.mechanisms import mechanisms_record
 from bilayer_core.forces.surface_friction import MOST_PLACES, PARTS
 from bilayer_core.jit import shapes_of, zeros_in_one
+from bilayer_core.model.friction_pairs import friction_values
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.contacts import ContactColumns, RodContact, RodContactList, Sliding, Slips, Surfaces
 from bilayer_core.model.records.parts import Plane, Space
@@ -32,7 +33,7 @@ from bilayer_core.model.records.problem import BorderedSystem, Outcome, Problem,
 from bilayer_core.model.records.status import BORDER_CAPACITY_EXCEEDED, PAIR_CAPACITY_EXCEEDED, ROD_CAPACITY_EXCEEDED
 from bilayer_core.model.records.step import Configuration, Point, Stage, StepAccount, Work
 from bilayer_core.model.rod_surfaces import NearPairs
-from bilayer_core.model.set_friction import friction_law, friction_values, none_given
+from bilayer_core.model.set_friction import friction_law, none_given
 from bilayer_core.model.sizes import sizes_of
 
 Array = np.ndarray
@@ -144,10 +145,10 @@ class Storage:
         return self._model.surfaces.allocated(sizes, stiffness=stiffness, margin=np.full(1, -1.0))
 
     def _sliding(self, before: Problem | None, sizes: dict[str, int]) -> Sliding:
-        model, of_bodies = self._model, self._model.surfaces.contact_point_body >= 0
-        law = friction_law(model.scene, model.forces, self._friction)
-        grains = model.sliding.surface_grain, model.sliding.point_grain
-        sliding = model.sliding.allocated(sizes, **friction_values(law, of_bodies, *grains))
+        scene, of_model = self._model.scene, self._model.sliding
+        law = friction_law(scene, self._model.forces, self._friction)
+        surfaces = of_model.surface_owner, of_model.surface_grain, of_model.point_grain
+        sliding = of_model.allocated(sizes, **friction_values(scene, law, *surfaces))
         if before is not None:
             _take_over(before.sliding, sliding, int(before.sliding.count[0]))
         if not sliding.acts:

@@ -377,7 +377,7 @@ def _add_friction(rods, stage, position, origin, gradient):
             slip[m] -= along * normal[c, m]
             square += slip[m] * slip[m]
         speed = math.sqrt(square) / h
-        limit = rods.coefficient * contacts.normal_force[c]
+        limit = rods.coefficient[rods.rod[i], rods.rod[j]] * contacts.normal_force[c]
         energy += limit * h * friction_potential(speed, threshold)
         over_speed = friction_over_speed(speed, threshold)
         ratio, excess = limit * over_speed / h, 0.0
@@ -419,7 +419,7 @@ def rod_slip_along(rods, strands, stage, at, system, begin, path_out):
     end : int
         Row after the last contact.
     """
-    contacts, coefficient, rails = rods.sliding, rods.coefficient, rods.rails
+    contacts, rails = rods.sliding, rods.rails
     position, origin, node_step = at.position, stage.origin_position, system.node_step
     if rails.exists and contacts.count[0] > 0:
         write_rail_slips(rails, strands, stage, at)
@@ -445,7 +445,9 @@ def rod_slip_along(rods, strands, stage, at, system, begin, path_out):
         along = together / size if size > 0.0 else math.sqrt(total)
         path_out[k, 0], path_out[k, 1] = size, along
         path_out[k, 2], path_out[k, 3] = 0.0, math.sqrt(max(total - along * along, 0.0))
-        path_out[k, 4] = path_out[k, 5] = path_out[k, 6] = coefficient * coefficient
-        path_out[k, 7], path_out[k, 8] = contacts.normal_force[c], coefficient * stage.length
+        mu = rods.coefficient[rods.rod[contacts.node[c, 0]], rods.rod[contacts.node[c, 1]]]
+        path_out[k, 4] = path_out[k, 5] = path_out[k, 6] = mu * mu
+        path_out[k, 7] = contacts.normal_force[c] if mu > 0.0 else 0.0
+        path_out[k, 8] = (mu if mu > 0.0 else 1.0) * stage.length
         path_out[k, 9] = rods.threshold
     return begin + contacts.count[0]

@@ -152,8 +152,9 @@ def _turned(rotation, b, x, y, z, sign):
 def _write_axis(sliding, surfaces, at, k, i, s, node, n):
     """Write the forward direction of contact k in its tangent plane, and its coefficients."""
     a, b = surfaces.contact_point_body[i], surfaces.body[s]
+    owner = sliding.owner[i]
     for c in range(3):
-        sliding.mu[k, c] = sliding.coefficient[i, c]
+        sliding.mu[k, c] = sliding.coefficient[owner, s, c]
     x = y = z = 0.0
     if sliding.grained:
         x, y, z = _axis_of_grain(sliding, at, i, s, a, b)
@@ -161,7 +162,7 @@ def _write_axis(sliding, surfaces, at, k, i, s, node, n):
         along = x * n[0] + y * n[1] + z * n[2]
         directed = 1.0 - along * along > NO_DIRECTION * NO_DIRECTION
         for c in range(3):
-            sliding.mu[k, c] = sliding.along_grain[c] if directed else sliding.across_all
+            sliding.mu[k, c] = sliding.along_grain[owner, s, c] if directed else sliding.across_grain[owner, s]
         axis = _tangential(x, y, z, n[0], n[1], n[2])
     else:
         axis = _forward(sliding, surfaces.node_edges, at, a < 0, node, n[0], n[1], n[2])

@@ -9,12 +9,12 @@ import numpy as np
 
 from bilayer_core.jit import UNALLOCATED
 from bilayer_core.model.colliders import RODS, Collider, colliders, points_can_collide, shapes_can_collide
+from bilayer_core.model.friction_pairs import friction_values
 from bilayer_core.model.model import Model, PlacedBodies
 from bilayer_core.model.points_between import demand_of, strip_area
 from bilayer_core.model.records import contacts
 from bilayer_core.model.records.contacts import Sliding, Surfaces
 from bilayer_core.model.rod_points import RodPoints, rod_points
-from bilayer_core.model.set_friction import friction_values
 from bilayer_core.model.shape_numbers import NUMBER, Shape, obstacle_pose, shape_of, signed_distance
 from bilayer_core.model.strand_arrays import StrandArrays
 from bilayer_core.model.strands import Collected
@@ -45,6 +45,7 @@ class _Point:
     body: int
     can_collide: list[bool]
     grain: np.ndarray
+    collider: Collider
 
 
 def build_contact(
@@ -65,6 +66,7 @@ def build_contact(
             index,
             [points_can_collide(of_bodies[index], s) for s in owners],
             _grain(body.surface),
+            of_bodies[index],
         )
         for index, body in enumerate(scene.bodies)
         for p in body.contact_points
@@ -149,16 +151,22 @@ def build_contact(
     surface_grain = np.array([s.grain for s in surfaces]).reshape(-1, 3)
     point_grain = np.zeros((len(point_body), 3))
     point_grain[nodes : nodes + len(others)] = np.array([p.grain for p in others]).reshape(-1, 3)
-    friction = contact.friction if contact is not None else None
+    rod_number = {name: number for number, rod in enumerate(scene.rods) for name in rod.copy_names}
+    rod_of_node = np.concatenate([np.full(s.node_count, rod_number[s.rod], dtype=np.int64) for s in found.strands])
+    owner_of_others = np.array([len(scene.rods) + p.collider.order for p in others], dtype=np.int64)
+    surface_owner = np.array([len(scene.rods) + s.collider.order for s in surfaces], dtype=np.int64)
+    law = contact.friction if contact is not None else None
     return dict(
         surfaces=record,
         sliding=Sliding.zeros(
             UNALLOCATED,
+            owner=np.concatenate([rod_of_node, owner_of_others, rod_of_node[of_rods.node]]),
+            surface_owner=surface_owner,
             node_axis=found.column("node_axis", np.int64),
             surface_grain=surface_grain,
             point_grain=point_grain,
             spreads=bool(flat.any() and not bent.all()),
-            **friction_values(friction, point_body >= 0, surface_grain, point_grain),
+            **friction_values(scene, law, surface_owner, surface_grain, point_grain),
         ),
         surface_names=tuple(s.collider.name for s in surfaces),
         point_count=len(shown),
@@ -233,7 +241,9 @@ def _points_of(part: Owned, owners: list[Collider]) -> list[_Point]:
         return []
     points, radius, length = part.shape.points()
     positions = part.position + points @ part.rotation.T
-    return [_Point(position, radius, length, part.body, can_collide, part.grain) for position in positions]
+    return [
+        _Point(position, radius, length, part.body, can_collide, part.grain, part.collider) for position in positions
+    ]
 
 
 def _nodes_can_collide(

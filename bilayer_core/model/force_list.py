@@ -15,6 +15,7 @@ from functools import cached_property
 from bilayer_core.model.colliders import ContactPair, contact_pairs
 from bilayer_core.model.findings import few
 from bilayer_core.model.free_motions import mechanisms_of
+from bilayer_core.model.friction_pairs import friction_of_rods, slides
 from bilayer_core.model.rod_pairs import RodPair, rod_pairs
 from bilayer_core.scene.body import Prescribed
 from bilayer_core.scene.config import SceneConfig
@@ -142,8 +143,7 @@ def _added_mass(q: Question) -> str | None:
 def _friction(q: Question) -> str | None:
     if not q.pairs:
         return "no surfaces that can meet"
-    law = q.scene.contact.friction
-    return _unless(law is not None and law.acts, "no friction coefficient above zero")
+    return _unless(slides(q.scene, q.scene.contact.friction), "no friction coefficient above zero")
 
 
 def _restitution(q: Question) -> str | None:
@@ -169,8 +169,8 @@ def _rod_barrier(q: Question) -> str | None:
 def _rod_friction(q: Question) -> str | None:
     if not q.rods_touch:
         return _rod_barrier(q)
-    law = q.scene.contact.friction
-    return _unless(law is not None and law.coefficient > 0.0, "no friction coefficient above zero")
+    coefficient = friction_of_rods(q.scene, q.scene.contact.friction)
+    return _unless(coefficient.max() > 0.0, "no friction coefficient above zero")
 
 
 CONSERVATIVE, DISSIPATIVE, INERTIAL, EXTERNAL = Kind

@@ -5,11 +5,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from bilayer_core.scene.config import Friction, SceneConfig
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.friction import Friction
 
 Array = np.ndarray
 OF_SCENE = -1.0
@@ -40,35 +39,3 @@ def friction_law(scene: SceneConfig, forces: tuple[str, ...], given: Array) -> F
         return law
     from_outside = {key: value for key, value in zip(COEFFICIENTS, given.tolist(), strict=True) if value != OF_SCENE}
     return law.model_copy(update=from_outside) if law is not None and from_outside else law
-
-
-def friction_values(law: Friction | None, of_bodies: Array, *grains: Array) -> dict[str, Any]:
-    """Return the values of `Sliding` that a law sets, the scene's or one that differs from it in coefficients.
-
-    Parameters
-    ----------
-    law : Friction or None
-    of_bodies : ndarray
-        Whether contact points are bodies', shape (n_contact_point,).
-    *grains : ndarray
-        Of surfaces and of contact points, as in `Sliding`.
-    """
-    axis = np.zeros(3) if law is None or law.axis is None else np.array(law.axis)
-    return dict(
-        acts=law is not None and law.acts,
-        threshold=law.speed_threshold if law is not None else 0.0,
-        coefficient=contact_point_friction(law, of_bodies),
-        grained=any(bool(directions.any()) for directions in (axis, *grains)),
-        along_grain=np.array(law.of_rods if law is not None else (0.0, 0.0, 0.0)),
-        across_all=law.coefficient if law is not None else 0.0,
-        world_axis=axis,
-    )
-
-
-def contact_point_friction(law: Friction | None, of_bodies: Array) -> Array:
-    """Return the coefficients forward, backward and sideways of contact points, of which some are of bodies, shape (n,
-    3).
-    """
-    coefficients = np.full((len(of_bodies), len(COEFFICIENTS) - 1), law.of_rods if law is not None else 0.0)
-    coefficients[of_bodies] = law.coefficient if law is not None else 0.0
-    return coefficients

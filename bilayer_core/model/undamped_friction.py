@@ -8,6 +8,7 @@ so its figures have no limit in the step, and the user is told.
 
 from __future__ import annotations
 
+from bilayer_core.model.friction_pairs import slides
 from bilayer_core.scene.config import SceneConfig
 
 
@@ -16,7 +17,7 @@ def unseen_vibrations(scene: SceneConfig) -> tuple[str, ...]:
     law = scene.contact.friction if scene.contact is not None else None
     used = dict.fromkeys(layer.material for rod in scene.rods for layer in rod.layers)
     undamped = [name for name in used if scene.materials[name].retardation_time == 0.0]
-    if law is None or not law.acts or not undamped:
+    if not slides(scene, law) or not undamped:
         return ()
     keys = ", ".join(f"materials.{name}.retardation_time" for name in undamped)
     return (

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from bilayer_core.scene.faults import ROUNDING, Fault
+from bilayer_core.scene.friction import Coefficients
 from bilayer_core.scene.mechanism import Sliding, Turning, resistance
 from bilayer_core.scene.part import AngularVelocity, Direction, Name, Part, Point, Velocity
 from bilayer_core.scene.schedule import faults_of_times
@@ -208,6 +209,8 @@ class Body(Part):
     """What others touch; without one nothing does."""
     contact_points: list[ContactPoint] = []
     """Points by which the body itself touches surfaces."""
+    friction: Coefficients | None = None
+    """Of its own; by default it takes those of what touches it, or of `contact.friction`."""
     drag: BodyDrag | None = None
     """Of the fluid on a free or guided body; none by default."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -25,6 +25,7 @@ class SceneConfig(Protocol):
     materials: dict
     stimuli: dict
     fluid: object
+    contact: Any
 
 
 def faults_of_scene(scene: SceneConfig) -> list[Fault]:
@@ -34,7 +35,7 @@ def faults_of_scene(scene: SceneConfig) -> list[Fault]:
         return too_large
     references = list(_references(scene))
     rest_lengths = [] if references else _rest_lengths(scene)
-    parts = _clamps(scene), _joints(scene), _surfaces(scene), _points(scene), _drags(scene)
+    parts = _clamps(scene), _joints(scene), _surfaces(scene), _points(scene), _drags(scene), _frictions(scene)
     return [*_names(scene), *references, *rest_lengths, *(fault for faults in parts for fault in faults)]
 
 
@@ -87,6 +88,25 @@ def _drags(scene: SceneConfig) -> Iterator[Fault]:
                 None,
                 "must be given (an area [m^2], such as 3 cm^2): the body has no surface of a size",
             )
+
+
+def _frictions(scene: SceneConfig) -> Iterator[Fault]:
+    """Yield a fault for coefficients of a part's own that lack what `contact.friction` says, or a direction."""
+    law = scene.contact.friction if scene.contact is not None else None
+    grains = {"bodies": [body.surface and body.surface.grain for body in scene.bodies]}
+    grains["obstacles"] = [obstacle.grain for obstacle in scene.obstacles]
+    for key in ("rods", "bodies", "obstacles"):
+        for index, part in enumerate(getattr(scene, key)):
+            own, where = part.friction, (key, index, "friction")
+            if own is None:
+                continue
+            if law is None:
+                demand = "must be left out without `contact.friction`, which has the `speed_threshold`"
+                yield where, own.coefficient, demand
+            elif own.directed and law.axis is None and key in grains and grains[key][index] is None:
+                given = next(name for name in ("forward", "backward", "sideways") if getattr(own, name) is not None)
+                demand = "must be left out without a direction: `grain` of the surface, or `contact.friction.axis`"
+                yield (*where, given), getattr(own, given), demand
 
 
 def _rest_lengths(scene: SceneConfig) -> Iterator[Fault]:

@@ -11,6 +11,7 @@ from bilayer_core.scene import checks
 from bilayer_core.scene.body import Body
 from bilayer_core.scene.channel_range import value_in_range
 from bilayer_core.scene.faults import Fault, refuse
+from bilayer_core.scene.friction import Friction
 from bilayer_core.scene.joint import Joint
 from bilayer_core.scene.load import Load, PointMass
 from bilayer_core.scene.part import AngularVelocity, Direction, Name, Part, Velocity
@@ -102,39 +103,6 @@ class Stimulus(Part):
         ]
 
 
-class Friction(Part):
-    """Coulomb friction, smoothed below a speed.
-
-    Rods may slide more easily one way than the other along their axis (`Rod.friction_axis`), and sideways; bodies feel
-    `coefficient`. Where `axis` or the `grain` of a surface is given, that is the axis of all that slides, bodies too.
-    """
-
-    coefficient: NonNegativeNumber
-    """μ, of bodies and, where the next keys do not say otherwise, of rods."""
-    speed_threshold: PositiveSpeed
-    """Sliding speed ε_v from which the full friction acts; what sticks creeps more slowly than that."""
-    forward: NonNegativeNumber | None = None
-    """Of rods sliding along + of their axis; like the next two, `coefficient` by default."""
-    backward: NonNegativeNumber | None = None
-    """Of rods sliding along − of their axis."""
-    sideways: NonNegativeNumber | None = None
-    """Of rods sliding across their axis."""
-    axis: Direction | None = None
-    """A direction in the world that is forward for rods and bodies alike, whatever way they lie; by default that of
-    each rod, and none for bodies. The `grain` of a surface goes before it."""
-
-    @property
-    def of_rods(self) -> tuple[float, float, float]:
-        """Coefficients of rods: forward, backward, sideways."""
-        given = (self.forward, self.backward, self.sideways)
-        return tuple(self.coefficient if value is None else value for value in given)
-
-    @property
-    def acts(self) -> bool:
-        """True if there is any friction."""
-        return self.coefficient > 0.0 or max(self.of_rods) > 0.0
-
-
 class Contact(Part):
     """Barrier that keeps surfaces apart, and friction."""
 
@@ -146,7 +114,7 @@ class Contact(Part):
     """Speed of the impacts that the barrier has to hold: where the heaviest part needs a larger stiffness than
     `stiffness` for that, it is used, and stated."""
     friction: Friction | None = None
-    """Of all surfaces; without it they are smooth."""
+    """Of all that touches; without it nothing rubs."""
     restitution: Restitution | None = None
     """Speed after an impact over that before, of bodies with each other and with obstacles; without it a barrier gives
     back all. Rods rebound by their waves, which the retardation time of a material damps."""

@@ -13,6 +13,7 @@ from pydantic import BeforeValidator, Field, field_serializer
 from bilayer_core.scene.close_paths import crossings
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, repeated
+from bilayer_core.scene.friction import Coefficients
 from bilayer_core.scene.imperfection import Imperfection
 from bilayer_core.scene.limits import MOST_NODES
 from bilayer_core.scene.part import AngularVelocity, Direction, Name, Part, Velocity
@@ -98,6 +99,8 @@ class Rod(Part):
     """Torsional stiffness: of the bonded section, or the sum of the layers' own."""
     friction_axis: Literal["path", "normal", "across"] = "path"
     """Direction of the rod that counts as forward for friction: along its path, its normal, or path × normal."""
+    friction: Coefficients | None = None
+    """Of its own; by default it takes those of what touches it, or of `contact.friction`."""
     imperfection: Imperfection | None = None
     """Small departure of the shape at rest from the path; none by default."""
     pattern: Patterns | None = None

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from bilayer_core.scene.faults import Fault, faults_of_rounding
+from bilayer_core.scene.friction import Coefficients
 from bilayer_core.scene.limits import MOST_POINTS
 from bilayer_core.scene.part import Direction, Name, Part, Point
 from bilayer_core.scene.units import Angle, NonNegativeLength, PositiveLength, whole
@@ -92,31 +93,34 @@ class Cylinder(_Cylinder):
     shape: Literal["cylinder"]
 
 
-class PlaneObstacle(_Plane):
-    """A fixed half space."""
+class _Fixed(Part):
+    """A surface fixed in the world."""
 
     name: Name
     """Unique among rods, bodies and obstacles."""
+    friction: Coefficients | None = None
+    """Of its own; by default it takes those of what touches it, or of `contact.friction`."""
+
+
+class PlaneObstacle(_Plane, _Fixed):
+    """A fixed half space."""
+
     type: Literal["plane"]
     point: Point
     """Any point of the plane."""
 
 
-class SphereObstacle(_Sphere):
+class SphereObstacle(_Sphere, _Fixed):
     """A fixed ball."""
 
-    name: Name
-    """Unique among rods, bodies and obstacles."""
     type: Literal["sphere"]
     position: Point
     """Of its middle."""
 
 
-class BoxObstacle(_Box):
+class BoxObstacle(_Box, _Fixed):
     """A fixed box."""
 
-    name: Name
-    """Unique among rods, bodies and obstacles."""
     type: Literal["box"]
     position: Point
     """Of its middle."""
@@ -124,11 +128,9 @@ class BoxObstacle(_Box):
     """Axis times angle: `[0, 0, 30 deg]` turns it about z."""
 
 
-class CylinderObstacle(_Cylinder):
+class CylinderObstacle(_Cylinder, _Fixed):
     """A fixed cylinder."""
 
-    name: Name
-    """Unique among rods, bodies and obstacles."""
     type: Literal["cylinder"]
     position: Point
     """Of its middle."""

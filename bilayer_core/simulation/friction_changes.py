@@ -52,4 +52,4 @@ def refuse_friction(model: Model, value: float | None, key: str) -> None:
 def coefficients(model: Model, state: State) -> dict[str, float]:
     """Return the coefficients that act in a state by key; empty if nothing slides with friction."""
     law = friction_law(model.scene, model.forces, state.friction) if acts(model.forces) else None
-    return dict(zip(COEFFICIENTS, (law.coefficient, *law.of_rods), strict=True)) if law is not None else {}
+    return dict(zip(COEFFICIENTS, (law.coefficient, *law.each_way), strict=True)) if law is not None else {}

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from bilayer_core.scene.config import Friction, SceneConfig
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.friction import Friction
 from bilayer_core.scene.part import Part
 
 FREE = {"name", "title", "description", "duration", "output"}

@@ -22,7 +22,7 @@ def test_the_robot_has_the_papers_parameters():
         layer: sum(s.node_count for s in simulator.model.strands if s.layer == layer) for layer in ("passive", "active")
     }
     assert nodes == {"passive": 100, "active": 55}
-    assert simulator.scene.contact.friction.of_rods[:2] == (0.3, 0.6)
+    assert simulator.scene.contact.friction.each_way[:2] == (0.3, 0.6)
 
 
 def test_every_cycle_moves_it_forward_and_by_the_same_from_the_second_on(forward):

@@ -20,7 +20,7 @@ def test_the_inchworm_has_the_papers_parameters():
     simulator = Simulator(load_scene(SCENE, [TWO_RODS]))
     passive, active = simulator.model.strands
     assert (passive.node_count, active.node_count) == (80, 50)
-    assert simulator.scene.contact.friction.of_rods[:2] == (0.3, 0.6)
+    assert simulator.scene.contact.friction.each_way[:2] == (0.3, 0.6)
 
 
 def test_every_cycle_moves_it_forward_and_by_the_same_from_the_second_on(forward):

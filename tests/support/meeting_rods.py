@@ -25,9 +25,12 @@ def model_of(rods, **more):
     return build_model(load_scene(scene(rods, contact={**contact(coefficient=0.4), "rods": True}, **more)))
 
 
-def parallel_rods(rng):
-    """Two rods side by side on different meshes, the second longer: insides, nodes and ends of segments face points."""
+def parallel_rods(rng, own=({}, {})):
+    """Two rods side by side on different meshes, the second longer: insides, nodes and ends of segments face points;
+    they may have keys of their own.
+    """
     rods = [rod([layer()], length=0.02, stations=6, name="a"), rod([layer()], length=0.03, stations=14, name="b")]
+    rods = [one | keys for one, keys in zip(rods, own, strict=True)]
     model = model_of([rods[0], {**rods[1], "path": {**rods[1]["path"], "start": [-0.004, 0, 5e-3]}}])
     position = model.start_position.copy()
     position[6:, 2] = 1.7e-3

@@ -100,11 +100,13 @@ class Sliding:
 
     acts: bool
     threshold: float
-    coefficient: Matrix
+    owner: Indices  # number of the rod, body or obstacle of each contact point, in this order, shape (n_contact_point,)
+    surface_owner: Indices  # likewise of each surface
+    coefficient: Stack  # of what each owns on each surface: forward, backward, sideways, shape (n_owner, n_surface, 3)
     node_axis: Indices  # which direction of each node counts as forward: 0 t, 1 m1, ±2 ± m2, shape (n_node,)
-    grained: bool  # whether a surface has a grain, or the world an axis; its coefficients, and the same every way:
-    along_grain: Vector  # shape (3,)
-    across_all: float
+    grained: bool  # whether a surface has a grain, or the world an axis; coefficients
+    along_grain: Stack  # along it, shape (n_owner, n_surface, 3)
+    across_grain: Matrix  # and where it has no direction, shape (n_owner, n_surface)
     world_axis: Vector  # 0 without one, shape (3,)
     surface_grain: Matrix  # forward direction on each in its body's frame, 0 without one, shape (n_surface, 3)
     point_grain: Matrix  # likewise of contact points, shape (n_contact_point, 3)
@@ -194,7 +196,8 @@ class RodContact:
     d_hat: float
     stiffness: float
     slides: bool
-    coefficient: float
+    coefficient: Matrix  # between two rods, shape (n_rod, n_rod)
+    rod: Indices  # number of the rod of each node
     threshold: float
     unit: float  # barrier distance and thickest layer together
     point_weight: Vector
