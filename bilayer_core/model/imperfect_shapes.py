@@ -101,7 +101,8 @@ def _symmetry(scene: SceneConfig, copy: RodCopy) -> str:
     moved = any(isinstance(motion, Prescribed) and motion.moves for motion in holders)
     if all(isinstance(motion, Prescribed) for motion in holders) and (grows or moved):
         return "is clamped at both ends and " + ("grows" if grows else "its ends move")
-    bent = grows or any(layer.natural_curvature or layer.natural_twist for layer in rod.layers)
+    natural = ("natural_curvature", "natural_curvature_across", "natural_twist")
+    bent = grows or any(getattr(layer, key) for layer in rod.layers for key in natural)
     if bent or not isinstance(rod.path, StraightPath) or (rod.clamp_start is None) == (rod.clamp_end is None):
         return ""
     direction, normal = (copy.place.directions(np.array(vector)) for vector in (rod.path.direction, rod.normal))

@@ -43,6 +43,7 @@ curvature, at any number of stations.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -128,7 +129,8 @@ SMALLEST = 1e-6
 
 def _varying(layer: Layer) -> tuple[float | Profile | None, ...]:
     """Return what may vary along a layer."""
-    return layer.thickness, layer.stiffness, layer.natural_curvature, layer.natural_twist
+    natural = layer.natural_curvature, layer.natural_curvature_across, layer.natural_twist
+    return layer.thickness, layer.stiffness, *natural
 
 
 def driven_cells(rod: Rod, cells: Cells, layer: Layer, law: Eigenstrain | None = None) -> Array:
@@ -151,6 +153,7 @@ class LayerCells:
     twist: Array  # GJ_l/λ
     twist_moment: Array  # GJ_l τ̄_l [N m]
     natural_moment: Array  # M̄ [N m]
+    across_moment: Array  # likewise across the width
     height: Array  # z [m]
 
 
@@ -165,11 +168,16 @@ def layer_cells(
     present, ratio = driven_cells(rod, cells, layer), stretch[..., cells.edge]
     bend, across = (present * stiffness / ratio for stiffness in section.bending_stiffness)
     twist = present * section.twisting_stiffness
-    moment = np.zeros_like(bend)
-    if layer.natural_curvature is not None:
-        start = (shape.strains() - shape.imperfection)[..., 0] / shape.voronoi
-        natural = ratio * means_between(layer.natural_curvature, begin, end)
-        moment = bend * (natural - start[..., (cells.half + 1) // 2])
+    handedness = np.asarray(shape.handedness)[:, None]
+
+    def moment(stiffness: Array, curvature: Any, axis: int, sign: Array | float) -> Array:
+        """Return what the layer's own curvature adds to that of the path."""
+        if curvature is None:
+            return np.zeros_like(stiffness)
+        start = (shape.strains() - shape.imperfection)[..., axis] / shape.voronoi
+        natural = sign * ratio * means_between(curvature, begin, end)
+        return stiffness * (natural - start[..., (cells.half + 1) // 2])
+
     return LayerCells(
         ratio=ratio,
         axial=present * section.axial_stiffness,
@@ -177,8 +185,9 @@ def layer_cells(
         bend=bend,
         across=across,
         twist=twist / ratio,
-        twist_moment=np.asarray(shape.handedness)[:, None] * twist * means_between(layer.natural_twist, begin, end),
-        natural_moment=moment,
+        twist_moment=handedness * twist * means_between(layer.natural_twist, begin, end),
+        natural_moment=moment(bend, layer.natural_curvature, 0, 1.0),
+        across_moment=moment(across, layer.natural_curvature_across, 1, handedness),
         height=side(rod, slot) * section.thickness - axis,
     )
 
@@ -228,6 +237,7 @@ class WholeSection:
         self.joint_stiffness = 1.0 / np.stack([self.to_nodes(part) for part in flexibility], axis=-1)
         self.joint_rest = shape.strains()
         self.joint_rest[..., 0] += self.to_nodes(moment[1] / bending)
+        self.joint_rest[..., 1] += self.to_nodes(cells.means(sum(layer.across_moment for layer in layers) / across))
         self.joint_rest[..., 2] += self.to_nodes(cells.means(sum(layer.twist_moment for layer in layers) / twist))
 
     def _in_series(self, stretch: Array, coupling: Array, bending: Array) -> tuple[Array, Array, Array]:

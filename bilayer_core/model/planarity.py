@@ -116,6 +116,8 @@ class _Survey:
             if rod.imperfection is not None and rod.imperfection.direction != "normal":
                 yield f"rods.{rod.name}.imperfection leaves {plane}"
             for layer in rod.layers:
+                if layer.natural_curvature_across is not None and any(extremes(layer.natural_curvature_across)):
+                    yield f"rods.{rod.name}.layers.{layer.name}.natural_curvature_across leaves {plane}"
                 if any(extremes(layer.natural_twist)):
                     yield f"rods.{rod.name}.layers.{layer.name}.natural_twist turns the rod out of {plane}"
         for body in scene.bodies:

@@ -110,8 +110,9 @@ def _can_close(scene: SceneConfig, rod: Rod) -> tuple[bool, str, float]:
         first, second = (layer.axial_stiffness for layer in layers)
         stiffness = stiffness + first * second / (first + second) * (0.5 * figures.thickness) ** 2
     weight = float(sum(layer.mass for layer in layers).max() * np.linalg.norm(scene.gravity))
-    natural = [np.abs(values_at(layer.natural_curvature or 0.0, rod.edge_length * middles)) for layer in rod.layers]
-    bent = figures.free_curvature() + np.max(natural, axis=0)
+    own = [[layer.natural_curvature or 0.0, layer.natural_curvature_across or 0.0] for layer in rod.layers]
+    natural = np.abs([[values_at(part, rod.edge_length * middles) for part in parts] for parts in own])
+    bent = figures.free_curvature() + natural.max(axis=0).sum(axis=0)
     sag = weight * length**3 / (6.0 * float(stiffness.min()))
     if all(variant.clamp_start or variant.clamp_end for variant in rod.variants):
         sag = min(sag, 0.5 * HALF_TURN)

@@ -152,14 +152,15 @@ def _rest(rod: Rod, layer: Layer, shape: StrandShape) -> Array:
     begin, end = along - 0.5, along + 0.5
     if not shape.closed:
         begin, end = np.maximum(begin, first), np.minimum(end, last)
-    natural = (
-        means_between(part, rod.edge_length * begin, rod.edge_length * end)
-        for part in (0.0 if layer.natural_curvature is None else layer.natural_curvature, layer.natural_twist)
-    )
-    curvature, twist = natural
-    if layer.natural_curvature is not None:
-        rest[:, 0] = shape.imperfection[:, 0] + curvature * voronoi
-    rest[:, 2] += shape.handedness * twist * voronoi
+    for axis, sign, own in (
+        (0, 1.0, layer.natural_curvature),
+        (1, shape.handedness, layer.natural_curvature_across),
+        (2, shape.handedness, layer.natural_twist),
+    ):
+        if own is None:
+            continue
+        natural = sign * means_between(own, rod.edge_length * begin, rod.edge_length * end) * voronoi
+        rest[:, axis] = natural + (rest if axis == 2 else shape.imperfection)[:, axis]
     return rest
 
 

@@ -70,7 +70,11 @@ def _stays_in_plane(simulator: Simulator, strand: Strand) -> bool:
     if any(body.name in holding and body.motion.turns for body in scene.bodies):
         return False
     rod = next(rod for rod in scene.rods if strand.rod in rod.copy_names)
-    if any(any(extremes(layer.natural_twist)) for layer in rod.layers):
+    if any(
+        extremes(part) != (0.0, 0.0)
+        for layer in rod.layers
+        for part in (layer.natural_twist, layer.natural_curvature_across or 0.0)
+    ):
         return False
     places, normals = model.start_position[strand.nodes], model.start_director1[strand.edges]
     places = (places - places[0]) / np.linalg.norm(np.ptp(places, axis=0))

@@ -56,6 +56,8 @@ class Layer(Part):
     """Multiple of the material's elastic moduli."""
     natural_curvature: varying(Curvature) | None = None
     """Of the layer by itself, through the thickness, positive where it bends to the normal; default: the path's."""
+    natural_curvature_across: varying(Curvature) | None = None
+    """Of the layer by itself, across the width, positive where it bends to path × normal; default: the path's."""
     natural_twist: varying(Twist) = 0.0
     """Of the layer by itself, about the path, beside the twist of the path."""
 
@@ -259,7 +261,8 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
             demand = f"must be at most {largest:g} m: a tenth of the path's length, and half its radius"
             faults.append((("imperfection", "size"), rod.imperfection.size, demand))
     for index, layer in enumerate(rod.layers):
-        varying = ("thickness", "stiffness", "natural_curvature", "natural_twist")
+        faults += _bent_across(rod, index)
+        varying = ("thickness", "stiffness", "natural_curvature", "natural_curvature_across", "natural_twist")
         faults += _profiles(layer, ("layers", index), varying, rod.path.length)
         for number, law in enumerate(layer.eigenstrain):
             where: Location = ("layers", index, "eigenstrain", number, "interval")
@@ -302,7 +305,7 @@ def _faults_of_closed(rod: Rod) -> Iterator[Fault]:
             if getattr(holder, end, None) is not None:
                 yield (*where, end), getattr(holder, end), "must be left out: a closed path has no ends to hold"
     parts = [((), rod, ("width",))]
-    names = ("thickness", "stiffness", "natural_curvature", "natural_twist")
+    names = ("thickness", "stiffness", "natural_curvature", "natural_curvature_across", "natural_twist")
     parts += [(("layers", index), layer, names) for index, layer in enumerate(rod.layers)]
     for where, part, keys in parts:
         for key in keys:
@@ -361,6 +364,15 @@ def _faults_of_copies(rod: Rod) -> Iterator[Fault]:
         first, second = (rod.copy_names[copy] for copy in pair)
         demand = f"must leave no copy where another is: {second} lies on {first}"
         yield ("pattern",), rod.pattern.type, demand
+
+
+def _bent_across(rod: Rod, index: int) -> Iterator[Fault]:
+    """Yield a fault where the inner border of a layer would have no length by its natural curvature."""
+    bend = rod.layers[index].natural_curvature_across
+    worst = max(map(abs, extremes(bend))) if bend is not None else 0.0
+    if 0.5 * worst * extremes(rod.width)[1] >= 1.0:
+        demand = f"must be below {2.0 / extremes(rod.width)[1]:g} 1/m: the inner border would have no length"
+        yield ("layers", index, "natural_curvature_across"), worst, demand
 
 
 def _sharp_bends(rod: Rod) -> Iterator[Fault]:
