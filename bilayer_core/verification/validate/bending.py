@@ -57,6 +57,22 @@ def beam2d(m: float, n: float, eigenstrain: float) -> float:
     return -beam.curvatures[STATIONS // 2] * THICKNESS / eigenstrain
 
 
+def across(model: str, of_path: float, of_layers: float) -> tuple[float, float]:
+    """Return the distance of the ends [m] of a strip that is bent across its width [1/m], and has rest at another."""
+    length, angle = 0.1, of_path * np.linspace(0.0, 0.1, STATIONS)
+    ribbon = rod(
+        [layer(name, natural_curvature_across=of_layers) for name in "ab"], length, STATIONS, clamp_start="wall"
+    )
+    if of_path:
+        points = np.stack([np.sin(angle), np.cos(angle) - 1.0, 0.0 * angle], axis=1) / of_path
+        ribbon["path"] = {"shape": "spline", "points": points.tolist()}
+    simulator = Simulator(load_scene(scene([ribbon], bodies=[fixed()])), model=model)
+    simulator.solve_static()
+    ends = simulator.positions.reshape(-1, STATIONS, 3).mean(axis=0)[[0, -1]]
+    chord = 2.0 * np.sin(0.5 * of_layers * length) / of_layers if of_layers else length
+    return float(np.linalg.norm(ends[1] - ends[0])), chord
+
+
 MODELS = {"two_rod": (two_rod, 0.01), "beam2d": (beam2d, 0.001)}
 SWEEPS = {
     "m": [(ratio, 1.0) for ratio in RATIOS],
@@ -74,13 +90,27 @@ def _case(name: str, model: str, m: float, n: float, eigenstrain: float) -> Case
     )
 
 
-CASES = [
-    _case(f"bending/{model}/{sweep} = {dict(m=m, n=n)[sweep]:.3g}", model, m, n, FIGURE_STRAIN)
-    for sweep, ratios in SWEEPS.items()
-    for model in MODELS
-    for m, n in ratios
-] + [
-    _case(f"bending/pair m = {m:g}, n = {n:g}/{100 * strain:g} %", "two_rod", m, n, strain)
-    for m, n in PAIRS
-    for strain in (0.005, 0.05)
-]
+CASES = (
+    [
+        _case(f"bending/{model}/{sweep} = {dict(m=m, n=n)[sweep]:.3g}", model, m, n, FIGURE_STRAIN)
+        for sweep, ratios in SWEEPS.items()
+        for model in MODELS
+        for m, n in ratios
+    ]
+    + [
+        _case(f"bending/pair m = {m:g}, n = {n:g}/{100 * strain:g} %", "two_rod", m, n, strain)
+        for m, n in PAIRS
+        for strain in (0.005, 0.05)
+    ]
+    + [
+        Case(
+            f"bending/across the width/{what}, {model}",
+            "chord of the circle that the layers have by themselves",
+            1e-3,
+            lambda model=model, curvatures=curvatures: across(model, *curvatures),
+            "m",
+        )
+        for what, curvatures in (("cut straight", (0.0, 12.0)), ("cut along a circle", (12.0, 0.0)))
+        for model in ("laminate", "two_rod")
+    ]
+)

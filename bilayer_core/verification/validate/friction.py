@@ -235,6 +235,26 @@ def stride(forward: float, backward: float, stations: int) -> tuple[float, float
     return 1e3 * float(middle), 1e3 * STRAIN * STRIP * (backward - forward) / (backward + forward)
 
 
+def pulled_by_own(rule: str) -> tuple[float, float]:
+    """Return the speed [m/s] after 0.5 s of a block that is pulled by half its weight, with 0.3 on ground with 0.1."""
+    law = contact(coefficient=0.6, speed_threshold=1e-5)
+    law["friction"]["combine"] = rule
+    content = scene(
+        [rod([layer()], length=0.02, stations=3, start=FAR, clamp_start="wall")],
+        gravity=[0.5 * GRAVITY, 0, -GRAVITY],
+        obstacles=[GROUND | {"friction": {"coefficient": 0.1}}],
+        contact=law,
+        bodies=[fixed(position=FAR), block((0, 0, SIZE[2])) | {"friction": {"coefficient": 0.3}}],
+    )
+    simulator = at_rest(content | {"solver": {}})
+    simulator.run(0.5)
+    return float(simulator.frame().body_velocities[1, 0]), 0.5 * (0.5 - OF_PAIR[rule]) * GRAVITY
+
+
+OF_PAIR = {"minimum": 0.1, "geometric": math.sqrt(0.03), "mean": 0.2, "maximum": 0.3}
+"""Coefficients by the rules of `contact.friction.combine` from 0.1 and 0.3."""
+
+
 def _named(solver: dict) -> str:
     if "integrator" in solver:
         return f"{solver['integrator']}, {1e3 * solver['dt']:g} ms"
@@ -293,5 +313,15 @@ CASES = [
         )
         for forward, backward in ((0.4, 0.5), (0.2, 0.8))
         for stations in (21, 41, 81)
+    ),
+    *(
+        Case(
+            f"friction/of two/{rule}",
+            f"(½ − μ) g t with μ = {mu:.4g}, the {rule} of 0.1 and 0.3",
+            1e-3,
+            lambda rule=rule: pulled_by_own(rule),
+            "m/s",
+        )
+        for rule, mu in OF_PAIR.items()
     ),
 ]
