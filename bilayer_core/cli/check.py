@@ -96,7 +96,11 @@ def _parts(scene) -> dict[str, list[str]]:
     parts = {}
     for rod in scene.rods:
         copies = f"{rod.pattern.copies} of them, each " if rod.pattern else ""
-        section = f"{1e3 * rod.path.length:.4g} mm long, {_millimetres(extremes(rod.width))} wide"
+        wide = f"{_millimetres(extremes(rod.width))} wide"
+        if rod.radius is not None:
+            hole = f", hole {_millimetres(extremes(rod.inner_radius))}" if rod.inner_radius != 0.0 else ""
+            wide = f"round, radius {_millimetres(extremes(rod.radius))}{hole}"
+        section = f"{1e3 * rod.path.length:.4g} mm long, {wide}"
         stations = f"{rod.stations} stations {1e3 * rod.edge_length:.3g} mm apart"
         layers = ", ".join(f"{layer.name} {_millimetres(extremes(layer.thickness))}" for layer in rod.layers)
         held = [
@@ -109,7 +113,7 @@ def _parts(scene) -> dict[str, list[str]]:
         free = "no ends" if rod.closed else "both ends free"
         lines = [
             f"{copies}{shape}{section}, {stations}; {', '.join(held) or free}{rubs}",
-            f"bottom to top: {layers}",
+            f"bottom to top: {layers}" if rod.radius is None else f"one layer: {rod.layers[0].name}",
         ]
         if rod.pattern and (rod.pattern.stimuli or rod.pattern.gains):
             lines.append(_own_laws(rod.pattern))

@@ -64,6 +64,8 @@ def turning_flow_of(model: Model) -> TurningFlow:
     for strand in model.strands:
         nodes = slice(strand.first_node, strand.first_node + strand.node_count)
         share, width = strand.thickness / whole[nodes], strand.width
+        if strand.round:
+            continue  # a round rod turns about its axis without pushing the fluid
         at_edges = [0.5 * (of[1:] + of[:-1]) for of in (share, width)]
         own = slice(strand.first_edge, strand.first_edge + strand.node_count - 1)
         coefficient[own] = at_edges[0] * at_edges[1] ** 4 * model.rods.rest_length[own]

@@ -147,6 +147,7 @@ def _strands(
                 offset=offset,
                 curvature=curvature,
                 closed=shape.closed,
+                round=rod.radius is not None,
                 layers=drawn,
             )
         )

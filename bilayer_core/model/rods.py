@@ -60,6 +60,7 @@ def _add_copy(found: Collected, scene: SceneConfig, copy: RodCopy, body_index: d
             offset=np.zeros(last - first + 1),
             curvature=shape.curvature,
             closed=shape.closed,
+            round=rod.radius is not None,
         )
         _add_eigenstrain(found, scene, rod, slot, strand)
         time = scene.materials[layer.material].retardation_time

@@ -1,4 +1,5 @@
-"""Stiffness and inertia of rectangular sections, alone and bonded in pairs (thickness h through the layer, width w).
+"""Stiffness and inertia of sections: rectangles, alone and bonded in pairs (thickness h through the layer, width w),
+and round ones, hollow or not.
 
 All of them are given at some places along a path; arrays have shape (n_place,). Where a section changes along a rod,
 masses, axial stiffness and bonds take that in the middle of an edge; bending, twist, contact and drag that at the node.
@@ -38,6 +39,8 @@ class Section(ReadOnlyArrays):
         ρ w h (w² + h²)/12 per length, about the tangent [kg m].
     width, thickness : Array
         [m]
+    polar_stiffness : Array or None
+        GJ of a round section, 2 G I [N m²].
     """
 
     axial_stiffness: Array
@@ -47,10 +50,13 @@ class Section(ReadOnlyArrays):
     spin_inertia: Array
     width: Array
     thickness: Array
+    polar_stiffness: Array | None = None
 
     @cached_property
     def twisting_stiffness(self) -> Array:
         """GJ of the layer by itself (see `torsion_section`) [N m²]."""
+        if self.polar_stiffness is not None:
+            return self.polar_stiffness
         stiffness = rectangle_torsion(self.shear_modulus, self.width, self.thickness)
         stiffness.setflags(write=False)
         return stiffness
@@ -61,8 +67,10 @@ def sections(rod: Rod, layer: Layer, material: Material, stations: Array) -> Sec
 
     def made() -> Section:
         along = rod.edge_length * rod.on_path(stations)
-        varying = (values_at(value, along) for value in (rod.width, layer.thickness, layer.stiffness))
-        return rectangle(material, *varying)
+        stiffness = values_at(layer.stiffness, along)
+        if rod.radius is not None:
+            return tube(material, values_at(rod.radius, along), values_at(rod.inner_radius, along), stiffness)
+        return rectangle(material, values_at(rod.width, along), values_at(layer.thickness, along), stiffness)
 
     return rod.keep(("sections", stations.tobytes()), (layer, material), made)
 
@@ -96,6 +104,25 @@ def rectangle(material: Material, width: Array, thickness: Array, stiffness: Arr
         spin_inertia=material.density * area * (width**2 + thickness**2) / 12.0,
         width=width,
         thickness=thickness,
+    )
+
+
+def tube(material: Material, radius: Array, inner: Array, stiffness: Array | float = 1.0) -> Section:
+    """Return the round sections of `material` from an inner radius to a radius [m], with moduli times `stiffness`:
+    A = π (R² − r²), I = π/4 (R⁴ − r⁴), J = 2 I.
+    """
+    e = stiffness * material.youngs_modulus
+    g = e / (2.0 * (1.0 + material.poisson_ratio))
+    area, second = np.pi * (radius**2 - inner**2), 0.25 * np.pi * (radius**4 - inner**4)
+    return Section(
+        axial_stiffness=e * area,
+        bending_stiffness=(e * second, e * second),
+        shear_modulus=g,
+        mass=material.density * area,
+        spin_inertia=material.density * 2.0 * second,
+        width=2.0 * radius,
+        thickness=2.0 * radius,
+        polar_stiffness=2.0 * g * second,
     )
 
 

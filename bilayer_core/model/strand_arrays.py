@@ -35,6 +35,7 @@ class StrandArrays(ReadOnlyArrays):
     offset: Array  # of the middle between its faces from its nodes, along m1 [m], likewise
     curvature: Array  # of its nodes' curve at the start [1/m], likewise
     closed: bool = False  # whether its last two nodes, and its last edge, are copies of the first
+    round: bool = False  # whether its sections are
     layers: tuple[StrandArrays, ...] = ()  # of a strand that stands for several: each on those nodes where it is
 
     @property

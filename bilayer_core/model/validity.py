@@ -227,6 +227,9 @@ class EdgeFigures:
     def __init__(self, scene: SceneConfig, rod: Rod):
         stations = np.arange(rod.stations - 1) + 0.5
         self.width, self._layers = outline(rod, stations)
+        self._hole = None  # inner over outer radius of round sections
+        if rod.radius is not None:
+            self._hole = 2.0 * values_at(rod.inner_radius, rod.edge_length * stations) / self.width
         self._moduli, self._shear_moduli = np.zeros_like(self._layers), np.zeros_like(self._layers)
         self.eigenstrain = np.zeros_like(self._layers)
         self.eigenstrain_range = np.zeros((2, *self._layers.shape))
@@ -291,8 +294,15 @@ class EdgeFigures:
         """Return the bending stiffness times the deflection by shear per force and length [m²], shape (n_edge,).
 
         D c with c = w ∫ Q²/(G D²) dz and Q(z) = ∫ E z dz from the face to z, heights being over the neutral axis: a
-        section's shear stress V Q/D, and its energy ½ c V². It is 6 EI/(5 GA) for one layer.
+        section's shear stress V Q/D, and its energy ½ c V². It is 6 EI/(5 GA) for one layer, and for a round one
+        EI/(k GA) with Cowper's k = 6 (1 + ν)(1 + m²)²/((7 + 6ν)(1 + m²)² + (20 + 12ν) m²), m = r/R (1966).
         """
+        if self._hole is not None:
+            nu, m = self.poisson_ratio, self._hole
+            whole = (1.0 + m**2) ** 2
+            second_over_area = self.width**2 * (1.0 + m**2) / 16.0
+            k = 6.0 * (1.0 + nu) * whole / ((7.0 + 6.0 * nu) * whole + (20.0 + 12.0 * nu) * m**2)
+            return self._moduli[0] / self._shear_moduli[0] * second_over_area / k
         moduli, edges = self._moduli, np.zeros((len(self._layers) + 1, len(self.width)))
         edges[1:] = np.cumsum(self._layers, axis=0)
         middle = 0.5 * (edges[1:] + edges[:-1])

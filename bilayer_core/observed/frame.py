@@ -37,6 +37,8 @@ class Strand:
         own cross-section there, and the offset of its own middle. Empty for a strand of one layer.
     closed : bool
         Whether it has no ends: its first and its last node are one, and all that they have is the same.
+    round : bool
+        Whether its sections are round, as wide as thick.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Strand:
     curvature: np.ndarray
     layers: tuple[Strand, ...] = ()
     closed: bool = False
+    round: bool = False
 
     def __repr__(self) -> str:
         parts = f", layers {', '.join(part.layer for part in self.layers)}" if self.layers else ""

@@ -94,6 +94,13 @@ def means_between(number_or_profile: float | Profile, begin: np.ndarray, end: np
     return (area(end) - area(begin)) / (end - begin)
 
 
+def doubled(number_or_profile: float | Profile) -> float | Profile:
+    """Return twice a number or a profile."""
+    if isinstance(number_or_profile, Profile):
+        return number_or_profile.model_copy(update={"value": [2.0 * value for value in number_or_profile.value]})
+    return 2.0 * number_or_profile
+
+
 def extremes(number_or_profile: float | Profile) -> tuple[float, float]:
     """Return the smallest and largest value."""
     values = number_or_profile.value if isinstance(number_or_profile, Profile) else [number_or_profile]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, field_serializer
+from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, field_serializer, model_serializer
 
 from bilayer_core.scene.close_paths import crossings
 from bilayer_core.scene.eigenstrain import Eigenstrain
@@ -20,7 +20,7 @@ from bilayer_core.scene.part import AngularVelocity, Direction, Name, Part, Velo
 from bilayer_core.scene.paths import ArcPath, Frames, HelixPath, SpiralPath, StraightPath
 from bilayer_core.scene.pattern import Patterns, Placement, pair_at_one_place, placed, stacked
 from bilayer_core.scene.point_paths import PolylinePath, SplinePath
-from bilayer_core.scene.profile import Profile, extremes, values_at, varying
+from bilayer_core.scene.profile import Profile, doubled, extremes, values_at, varying
 from bilayer_core.scene.units import (
     Curvature,
     NonNegativeLength,
@@ -46,8 +46,8 @@ class Layer(Part):
     """Unique in its rod."""
     material: Name
     """One of `materials`."""
-    thickness: varying(PositiveLength)
-    """Through the bond."""
+    thickness: varying(PositiveLength) | None = None
+    """Through the bond. Must be given, but for a round rod (`radius`)."""
     interval: tuple[NonNegativeLength, PositiveLength] | None = None
     """From and to, as lengths along the path [m]."""
     eigenstrain: Eigenstrains = []
@@ -83,8 +83,12 @@ class Rod(Part):
 
     name: Name
     """Unique among rods, bodies and obstacles."""
-    width: varying(PositiveLength)
-    """Of its rectangular section, across path and normal."""
+    width: varying(PositiveLength) | None = None
+    """Of its rectangular section, across path and normal. Must be given, but for a round rod."""
+    radius: varying(PositiveLength) | None = None
+    """Of a round rod of one layer, in place of width and thickness."""
+    inner_radius: varying(NonNegativeLength) = 0.0
+    """Of the hole in a round rod."""
     path: Annotated[
         StraightPath | ArcPath | SpiralPath | HelixPath | PolylinePath | SplinePath, Field(discriminator="shape")
     ]
@@ -214,6 +218,16 @@ class Rod(Part):
         first, last = self.span_of(layer, law)
         return range(math.floor(first), math.ceil(last)) if first < last else range(0)
 
+    @model_serializer(mode="wrap")
+    def _as_written(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Return a round rod without the width and thickness that its radius gives it, so that overrides may change
+        that.
+        """
+        content = write(self)
+        if self.radius is not None:
+            content["width"] = content["layers"][0]["thickness"] = None
+        return content
+
     def _faults(self) -> list[Fault]:
         return faults_of_rod(self)
 
@@ -237,7 +251,9 @@ LARGEST_IMPERFECTION = 0.1
 
 
 def faults_of_rod(rod: Rod) -> list[Fault]:
-    """Return the faults of a rod's normal, and of where its layers begin and end."""
+    """Return the faults of a rod's sections and normal, and of where its layers begin and end."""
+    if faults := list(_sections(rod)):
+        return faults
     demand = rod.path.demand_of_normal(np.array(rod.normal))
     faults: list[Fault] = [(("normal",), rod.normal, demand)] if demand else []
     faults += _faults_of_closed(rod) if rod.closed else ()
@@ -292,6 +308,36 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
     return faults
 
 
+def _sections(rod: Rod) -> Iterator[Fault]:
+    """Yield the faults of what a rod's sections are given by; the width and thickness of a round one are written."""
+    layers = [((), rod, "width"), *((("layers", k), layer, "thickness") for k, layer in enumerate(rod.layers))]
+    if rod.radius is None:
+        for where, part, key in layers:
+            if getattr(part, key) is None:
+                yield (*where, key), None, "must be given (a length [m], such as 2 mm), but for a round rod (`radius`)"
+        if rod.inner_radius != 0.0:
+            yield ("inner_radius",), rod.inner_radius, "must be left out: the hole of a round rod, which has a `radius`"
+        return
+    if len(rod.layers) == 2:
+        yield ("radius",), rod.radius, "must be left out: a rod of two layers has rectangular sections"
+        return
+    diameter = doubled(rod.radius)
+    for where, part, key in layers:
+        if getattr(part, key) not in (None, diameter):
+            yield (*where, key), getattr(part, key), "must be left out: the rod has a `radius`"
+    faults = [*_profiles(rod, (), ("radius", "inner_radius"), rod.path.length)]
+    if not faults:
+        ends = [end for end in (rod.radius, rod.inner_radius) if isinstance(end, Profile)]
+        along = np.array([0.0, *(place for profile in ends for place in profile.at)])
+        outer, inner = values_at(rod.radius, along), values_at(rod.inner_radius, along)
+        if (inner >= outer).any():
+            worst = int((inner - outer).argmax())
+            demand = f"must be below `radius`, {outer[worst]:g} m there: the wall would have no thickness"
+            faults.append((("inner_radius",), float(inner[worst]), demand))
+    yield from faults
+    vars(rod).update(width=diameter, layers=[rod.layers[0].model_copy(update={"thickness": diameter})])
+
+
 LEAST_CLOSED = 5
 """Stations of a closed rod: four edges."""
 
@@ -304,7 +350,7 @@ def _faults_of_closed(rod: Rod) -> Iterator[Fault]:
         for where, holder in ((), rod), (("pattern",), rod.pattern):
             if getattr(holder, end, None) is not None:
                 yield (*where, end), getattr(holder, end), "must be left out: a closed path has no ends to hold"
-    parts = [((), rod, ("width",))]
+    parts = [((), rod, ("width", "inner_radius"))]
     names = ("thickness", "stiffness", "natural_curvature", "natural_curvature_across", "natural_twist")
     parts += [(("layers", index), layer, names) for index, layer in enumerate(rod.layers)]
     for where, part, keys in parts:

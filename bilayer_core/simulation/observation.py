@@ -73,6 +73,7 @@ def strand(s: StrandArrays) -> Strand:
         *(part[: s.shown] for part in (s.width, s.thickness, s.offset, s.curvature)),
         tuple(map(strand, s.layers)),
         s.closed,
+        s.round,
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from bilayer_core.observed.frame import ShapeInfo, Strand
@@ -9,7 +11,10 @@ from bilayer_core.observed.frame import ShapeInfo, Strand
 # Corners of a cross-section along (m1, m2), in half thicknesses and half widths. Every corner is there twice, once
 # for the wide face and once for the narrow one, so that narrow faces can be darker and edges stay sharp.
 _CORNERS = np.array([[1, -1], [1, 1], [-1, -1], [-1, 1], [1, -1], [-1, -1], [1, 1], [-1, 1]], float)
-_FACES = ((0, 1), (3, 2), (5, 4), (6, 7))  # pairs of corners joined along the ribbon
+# A round section is drawn as an octagon, of which the narrow faces of corners that are there twice are a ribbon's.
+_OCTAGON = _CORNERS * np.repeat([[math.cos(math.pi / 8), math.sin(math.pi / 8)]], 8, axis=0)
+_OCTAGON[4:] = _CORNERS[4:] * [math.sin(math.pi / 8), math.cos(math.pi / 8)]
+_ROUND = (0, 1, 6, 7, 3, 2, 5, 4)  # corners one after the other, round the tangent
 WIDE_CORNERS = 4  # the first corners belong to the wide faces
 CORNERS = len(_CORNERS)
 
@@ -40,19 +45,26 @@ def ribbon_vertices(strand: Strand, positions: np.ndarray, material_frames: np.n
     ndarray
         [m], shape (times, nodes, CORNERS, 3), float32.
     """
-    normal = rotated(material_frames, 0)
+    normal, section = rotated(material_frames, 0), np.where(_is_round(strand), _OCTAGON, _CORNERS)
     thickness = 0.5 * strand.thickness[:, None] * normal
     width = 0.5 * strand.width[:, None] * rotated(material_frames, 1)
-    corners = np.einsum("c,tni->tnci", _CORNERS[:, 0], thickness) + np.einsum("c,tni->tnci", _CORNERS[:, 1], width)
+    high, wide = (np.einsum("nc,tni->tnci", section[..., axis], half) for axis, half in enumerate((thickness, width)))
+    corners = high + wide
     middles = positions + strand.offset[:, None] * normal
     return (middles[:, :, None] + corners).astype(np.float32)
 
 
-def ribbon_normals(material_frames: np.ndarray) -> np.ndarray:
-    """Return the normals of those corners, each that of its face, shape (times, nodes, CORNERS, 3), float32."""
+def ribbon_normals(strand: Strand, material_frames: np.ndarray) -> np.ndarray:
+    """Return the normals of those corners, of faces or radial, shape (times, nodes, CORNERS, 3), float32."""
     across, along = rotated(material_frames, 0), rotated(material_frames, 1)
     faces = (across, across, -across, -across, -along, -along, along, along)
-    return np.stack(faces, axis=-2).astype(np.float32)
+    radial = _OCTAGON[:, :1] * across[..., None, :] + _OCTAGON[:, 1:] * along[..., None, :]
+    return np.where(_is_round(strand), radial, np.stack(faces, axis=-2)).astype(np.float32)
+
+
+def _is_round(strand: Strand) -> np.ndarray:
+    """Return whether sections of a strand are round, for one or for each node, shape (n or 1, 1, 1)."""
+    return np.reshape(strand.round, (-1, 1, 1))
 
 
 def ribbon_triangles(nodes: int) -> np.ndarray:
@@ -60,17 +72,18 @@ def ribbon_triangles(nodes: int) -> np.ndarray:
     (triangles, 3).
     """
     last = CORNERS * (nodes - 1)
-    ends = np.array([FIRST_END, [last + corner for corner in LAST_END]])
+    ends = np.concatenate([FIRST_END, last + LAST_END])
     return np.concatenate([ribbon_faces(nodes), two_triangles(ends)])
 
 
-FIRST_END, LAST_END = (4, 5, 7, 6), (4, 6, 7, 5)  # corners of the first and last section, seen from outside
+LAST_END = np.array([[0, 1, 6, 7], [0, 7, 3, 2], [0, 2, 5, 4]])  # corners of the last section, seen from outside
+FIRST_END = LAST_END[:, ::-1]
 
 
 def ribbon_faces(nodes: int) -> np.ndarray:
     """Return the vertex indices of the surface of a ribbon without its ends, shape (triangles, 3)."""
     first = CORNERS * np.arange(nodes - 1)[:, None, None]
-    quads = np.array([[a, b, b + CORNERS, a + CORNERS] for a, b in _FACES])
+    quads = np.array([[a, b, b + CORNERS, a + CORNERS] for a, b in zip(_ROUND, (*_ROUND[1:], _ROUND[0]), strict=True)])
     return two_triangles((first + quads).reshape(-1, 4))
 
 

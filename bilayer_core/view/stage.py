@@ -226,19 +226,24 @@ class Stage:
         parts = {name: [getattr(of, name) for of in layers] for name in ("width", "thickness", "offset")}
         rows = np.concatenate([np.arange(part.start, part.stop) for part in self._moments.rows])
         nodes = np.concatenate([np.arange(of.nodes.start, of.nodes.stop) for of in layers])
-        return replace(layers[0], **{name: np.concatenate(part) for name, part in parts.items()}), rows, nodes
+        each = np.concatenate([np.full(len(of.width), of.round) for of in layers])
+        return (
+            replace(layers[0], round=each, **{name: np.concatenate(part) for name, part in parts.items()}),
+            rows,
+            nodes,
+        )
 
     def _add_ribbons(self) -> Any:
         triangles, first, ends = [], 0, []
         for layer in self._run.description.layers:
             nodes = layer.nodes.stop - layer.nodes.start
             triangles.append(first + geometry.ribbon_faces(nodes))
-            ends.append(first + np.array(geometry.FIRST_END))
+            ends.append(first + geometry.FIRST_END.ravel())
             first += nodes * geometry.CORNERS
-            ends.append(first - geometry.CORNERS + np.array(geometry.LAST_END))
-        triangles.append(first + geometry.two_triangles(np.arange(4 * len(ends)).reshape(-1, 4)))
+            ends.append(first - geometry.CORNERS + geometry.LAST_END.ravel())
         self._ends = np.concatenate(ends)
-        self._outwards = np.tile(np.repeat([[-1.0], [1.0]], 4, axis=0), (len(ends) // 2, 1))
+        triangles.append(first + geometry.two_triangles(np.arange(len(self._ends)).reshape(-1, 4)))
+        self._outwards = np.tile(np.repeat([[-1.0], [1.0]], geometry.LAST_END.size, axis=0), (len(ends) // 2, 1))
         count = first + len(self._ends)  # corners of ends are there once more, with normals of their own
         blank = np.zeros((count, 3), np.float32)
         shades = np.zeros((count, 3), np.uint8)
@@ -255,7 +260,7 @@ class Stage:
         colours = np.rint(own).astype(np.uint8)
         vertices, colours = vertices.reshape(-1, 3), colours.reshape(-1, 3)
         along = self._outwards * geometry.rotated(frames[0], 2)[self._ends // geometry.CORNERS]
-        normals = [geometry.ribbon_normals(frames).reshape(-1, 3), along.astype(np.float32)]
+        normals = [geometry.ribbon_normals(self._all_layers, frames).reshape(-1, 3), along.astype(np.float32)]
         joined = [vertices, vertices[self._ends]], normals, [colours, colours[self._ends]]
         _replace(self._ribbons, *map(np.concatenate, joined))
         return vertices

@@ -20,13 +20,13 @@ MOVE = {"type": "prescribed", "times": [0], "displacements": [[0, 0, 0]]}
     [
         # keys
         ("foo", 1, "unknown key; allowed are schema, name, title"),
-        ("rods.arm.widht", 0.01, "unknown key, did you mean width?; allowed are name, width, path"),
+        ("rods.arm.widht", 0.01, "unknown key, did you mean width?; allowed are name, width, radius"),
         ("bodies.ball.motion.mas", 1, "unknown key, did you mean mass?; allowed are type, mass, inertia"),
         ("rods", DELETE, "is missing; must be a list"),
         ("schema", DELETE, "is missing; must be 1"),
         ("title", DELETE, "is missing; must be text"),
         ("rods.arm.path", DELETE, "is missing; must be a mapping of keys to values"),
-        ("rods.arm.width", DELETE, "is missing; must be a length [m] above 0, such as 1 mm, or a profile {at: [...], "),
+        ("rods.arm.width", DELETE, "found null; must be given (a length [m], such as 2 mm), but for a round"),
         ("rods.arm.stations", DELETE, "is missing; must be a whole number of at least 3"),
         ("bodies.ball.motion.mass", DELETE, "found 0.0; must be a mass [kg] above 0 for a body that holds no rod"),
         ("contact.friction.speed_threshold", DELETE, "is missing; must be a speed [m/s] above 0, such as 0.1 mm/s"),

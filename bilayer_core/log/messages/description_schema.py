@@ -85,6 +85,7 @@ class StrandPart(Part):
     curvature: Numbers = None
     layers: Annotated[tuple[LayerPart, ...], Field(max_length=MOST_PARTS)] = ()
     closed: StrictBool = False
+    round: StrictBool = False
 
     @model_validator(mode="after")
     def _check_sizes(self) -> Self:

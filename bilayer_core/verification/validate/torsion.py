@@ -71,6 +71,23 @@ def torsional_stiffness(
     return moment / ((angle[1] - angle[0]) * edges / LENGTH / (last - first)), declared
 
 
+def turned_tube(inner: float, axis: int, model: str) -> tuple[float, float]:
+    """Return the angle [rad] by which a moment turns the end of a round rod, about itself (axis 0) or across, and M L
+    over G π/2 (R⁴ − r⁴) or E π/4 (R⁴ − r⁴); R is 2 mm.
+    """
+    second = 0.25 * np.pi * (2e-3**4 - inner**4)
+    stiffness = (2.0 * SHEAR_MODULUS if axis == 0 else GEL["youngs_modulus"]) * second
+    content = twisted_strip("laminate", 20, 0.0)
+    content["rods"][0] |= {"radius": 2e-3, "layers": [{"name": "wall", "material": "gel"}]}
+    content["rods"][0] |= {"inner_radius": inner} if inner else {}
+    del content["rods"][0]["width"]
+    content["loads"][0]["moment"] = [stiffness * TWIST * (k == axis) for k in range(3)]
+    simulator = Simulator(load_scene(content), model=model)
+    simulator.solve_static()
+    x, y, z, w = simulator.frame().body_quaternions[1]
+    return float(2.0 * np.arctan2(np.linalg.norm([x, y, z]), w)), TWIST * LENGTH
+
+
 def clamped_ends(torsion: str, edges: int) -> tuple[float, float]:
     """Return the angle of the crank of two rods whose centrelines may not tilt at their ends, and Vlasov's [rad]."""
     stiffness = strip_torsion((SHEAR_MODULUS, SHEAR_MODULUS), THICKNESS, 0.01)[torsion]
@@ -190,5 +207,17 @@ CASES = [
             lambda edges=edges: wave_curvature(edges),
         )
         for edges in MESHES
+    ),
+    *(
+        Case(
+            f"torsion/round/{kind}, {what}, {model}",
+            "M L over the stiffness of a round section",
+            1e-3,
+            lambda inner=inner, axis=axis, model=model: turned_tube(inner, axis, model),
+            "rad",
+        )
+        for kind, inner in (("solid", 0.0), ("hollow", 1.5e-3))
+        for axis, what in ((0, "twisted"), (1, "bent"), (2, "bent across"))
+        for model in ("laminate", "two_rod")
     ),
 ]
