@@ -52,6 +52,18 @@ def friction_of_rods(scene: SceneConfig, law: Friction | None) -> Array:
     return np.array([[_between(law, one, other, law.coefficient) for other in own] for one in own])
 
 
+def heeds(scene: SceneConfig, law: Friction, key: str, owner: Array, surface_owner: Array, rods: bool) -> bool:
+    """Return whether a coefficient of `contact.friction` holds between any of what may touch: owners of contact points
+    on those of surfaces, as in `Sliding`, and rods.
+    """
+    one, other = (law.model_copy(update={key: value}) for value in (1.0, 2.0))
+    there, surfaces = np.unique(owner), surface_owner.tolist()
+    tables = zip(_of_pairs(scene, one, surfaces), _of_pairs(scene, other, surfaces), strict=True)
+    if any((first[there] != second[there]).any() for first, second in tables):
+        return True
+    return rods and bool((friction_of_rods(scene, one) != friction_of_rods(scene, other)).any())
+
+
 def _own(scene: SceneConfig) -> list[Coefficients | None]:
     """Return coefficients of their own of rods, bodies and obstacles, in this order."""
     return [part.friction for parts in (scene.rods, scene.bodies, scene.obstacles) for part in parts]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from bilayer_core.errors import InputError
+from bilayer_core.model.friction_pairs import heeds
 from bilayer_core.model.model import Model
 from bilayer_core.model.set_friction import COEFFICIENTS, OF_SCENE, ROD_BARRIER, ROD_FRICTION, acts, friction_law
 from bilayer_core.model.state import State
@@ -37,6 +38,12 @@ def refuse_friction(model: Model, value: float | None, key: str) -> None:
         raise InputError(
             f"{what}: nothing slides against friction in the scene {scene.name!r}, which has {why}; allowed is a "
             "change where surfaces can meet and contact.friction has a coefficient above 0"
+        )
+    sliding, rods = model.sliding, ROD_FRICTION in model.forces
+    if not heeds(scene, scene.contact.friction, key, sliding.owner, sliding.surface_owner, rods):
+        raise InputError(
+            f"{what}: it holds between no two parts of the scene {scene.name!r}: they have friction of their own, or "
+            "no such direction; allowed are coefficients of `contact.friction` that hold somewhere"
         )
     if value is None:
         return

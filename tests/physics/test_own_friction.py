@@ -7,7 +7,7 @@ from support.meeting_rods import Rods, parallel_rods
 from support.sample_scenes import GROUND, contact, everything, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.errors import SceneError
+from bilayer_core.errors import InputError, SceneError
 from bilayer_core.verification.validate.friction import FAR, GRAVITY, SIZE, at_rest, block
 
 ON_BARRIER = 1.1988475e-3
@@ -92,6 +92,15 @@ def test_each_body_slides_by_its_own_and_what_is_set_later_is_that_of_the_others
     assert speeds(simulator, 0.4) == pytest.approx(0.4 * GRAVITY * np.array([0.1, 0.4, 0.0]), abs=4e-3)
     simulator.set_friction(0.2)
     assert speeds(simulator, 0.4) == pytest.approx(0.4 * GRAVITY * np.array([0.3, 0.4, 0.0]), abs=4e-3)
+
+
+def test_a_coefficient_that_holds_nowhere_cannot_be_set():
+    content = blocks(slippery=0.1, rough=0.6)
+    content["rods"][0] |= own(0.2)  # far away; it could touch the ground
+    simulator = on_ground(content)
+    for key in ("coefficient", "forward"):
+        with pytest.raises(InputError, match="friction of their own"):
+            simulator.set_friction(0.2, key)
 
 
 @pytest.mark.parametrize(("model", "dimension"), [("two_rod", 3), ("laminate", 3)])
