@@ -85,7 +85,8 @@ def lines(optimum: Any) -> list[str]:
         told[0] += f"; at the start {optimum.start:.6g}{ratio}"
     for name, value in optimum.best.parameters.items():
         shown = f"{value:.6g}" if isinstance(value, float) else f"{value}"
-        told.append(f"  {name} {shown} {optimum.units.get(name, '')}".rstrip())
+        end = ", at an end of its range: a wider one may have better" if name in optimum.at_end else ""
+        told.append(f"  {name} {shown} {optimum.units.get(name, '')}".rstrip() + end)
     if optimum.confirmed is None:
         told.append("NOT confirmed: the run with finer steps could not be made")
     else:

@@ -11,6 +11,9 @@ import click
 
 from bilayer_core.errors import InputError
 
+DIFFERS = 1
+"""Exit code if a run does not come out as it is in the log, two runs differ, or a log is not whole."""
+
 
 @dataclass
 class Settings:
@@ -139,3 +142,17 @@ scene_argument = click.argument("scene", metavar="SCENE")
 set_option = click.option(
     "--set", "overrides", multiple=True, metavar="PATH=VALUE", help="Change a value of the scene: rods.arm.stations=100"
 )
+
+
+def named_numbers(option: str, texts: tuple[str, ...]) -> dict[str, float | None]:
+    """Return the numbers by name, None where the schedule is to act."""
+    found = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        try:
+            found[name] = None if value == "null" else float(value)
+        except ValueError:
+            equals = ""
+        if not (equals and name):
+            raise InputError(f"{option}: {text!r} is not allowed; it must be NAME=NUMBER or NAME=null")
+    return found

@@ -10,7 +10,7 @@ import click
 
 from bilayer_core.cli.json_output import json_option, json_to
 from bilayer_core.cli.nodes import become_replay_node
-from bilayer_core.cli.options import Duration, Verb, set_option
+from bilayer_core.cli.options import DIFFERS, Duration, Verb, named_numbers, set_option
 from bilayer_core.cli.signals import Interruption
 from bilayer_core.cli.terminal import say
 from bilayer_core.cli.watch import Interrupt, compile_kernels, count_bar, progress_bar
@@ -19,8 +19,6 @@ from bilayer_core.errors import InputError
 if TYPE_CHECKING:
     from bilayer_core.runs.replay import Verification
 
-DIFFERS = 1
-"""Exit code if a run does not come out as it is in the log, or the log is not whole."""
 OF_VERIFY = ("tolerance", "derived", "json")
 OF_FROM = ("set", "stimulus", "load", "duration", "log", "rrd", "vary")
 OF_ROS = ("rate", "loop")
@@ -72,7 +70,7 @@ def replay(path: str, verifies: bool, moment: float | None, publishes: bool, **o
         return _verify(path, options)
     _refuse(options, OF_VERIFY, "is for --verify")
     for name in ("stimulus", "load"):
-        options[name] = _values(f"--{name}", options[name])
+        options[name] = named_numbers(f"--{name}", options[name])
     if options["vary"] is not None:
         if options["rrd"] is None or options["log"] is not None:
             raise InputError("--vary: its runs go into one recording; name that by --rrd, and no --log")
@@ -156,20 +154,6 @@ def _short(topics: tuple[str, ...]) -> list[str]:
     from bilayer_core.log.messages.topics import LOG_NAMESPACE
 
     return list(dict.fromkeys(topic.removeprefix(f"{LOG_NAMESPACE}/").split("/")[0] or topic for topic in topics))
-
-
-def _values(option: str, texts: tuple[str, ...]) -> dict[str, float | None]:
-    """Return the numbers by name, None where the schedule is to act."""
-    found = {}
-    for text in texts:
-        name, equals, value = text.partition("=")
-        try:
-            found[name] = None if value == "null" else float(value)
-        except ValueError:
-            equals = ""
-        if not (equals and name):
-            raise InputError(f"{option}: {text!r} is not allowed; it must be NAME=NUMBER or NAME=null")
-    return found
 
 
 def _go_on(path: str, moment: float, options: dict[str, Any]) -> None:

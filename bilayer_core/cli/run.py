@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from bilayer_core.cli.json_output import STANDARD_OUTPUT
-from bilayer_core.cli.options import Duration, Rate, Verb, scene_argument, set_option
+from bilayer_core.cli.options import Duration, Rate, Verb, named_numbers, scene_argument, set_option
 from bilayer_core.cli.report import summary_lines
 from bilayer_core.cli.signals import Interruption
 from bilayer_core.cli.terminal import say
@@ -31,6 +31,7 @@ TOLERANCE_HELP = (
 )
 ERROR_HELP = "Show the global error of the headline numbers, from runs at twice and half the step."
 QUARTER_HELP = "With --error-estimate: a run at a quarter of the step as well, for what half the step does not resolve."
+INSTEAD = "All the time, in place of its schedule."
 OUTPUT_SUFFIXES = {"log": ".mcap", "rrd": ".rrd", "summary": ".json", "save_state": ".npz"}
 """How the names of outputs end, by their options."""
 
@@ -47,6 +48,8 @@ RATE_ROUNDING = 1e-9
 @click.option("--integrator", metavar="NAME", help="auto, or a name from docs/scene_keys.md (solver).")
 @click.option("--tolerance", metavar="X", help=TOLERANCE_HELP)
 @set_option
+@click.option("--stimulus", multiple=True, metavar="CHANNEL=VALUE", help=INSTEAD)
+@click.option("--load", multiple=True, metavar="NAME=FACTOR", help=INSTEAD)
 @click.option("--log", metavar="FILE.mcap", help="Write a log.")
 @click.option(
     "--log-rate",
@@ -81,6 +84,10 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
     interrupt = Interrupt()
     observers = _open_outputs(config, options)
     simulator = _make_simulator(config, options["from_state"], options["at"], options["budget"], quiet)
+    for channel, value in named_numbers("--stimulus", options["stimulus"]).items():
+        simulator.set_stimulus(channel, value)
+    for name, factor in named_numbers("--load", options["load"]).items():
+        simulator.set_load(name, factor)
     duration = _duration(simulator, duration)
     if not quiet:
         _say_if_too_often(simulator, options["log_rate"])

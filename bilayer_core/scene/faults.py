@@ -100,6 +100,11 @@ def _line(fault: ErrorDetails, schema: type[BaseModel], data: Any) -> str:
         keys = _keys(_annotation_at(schema, fault["loc"][:-1]))
         return f"{path}: unknown key{suggestion(fault['loc'][-1], keys)}; allowed are {', '.join(keys)}"
     note = fault.get("ctx", {}).get("note")
+    if fault["type"] == "union_tag_not_found":
+        key = fault["ctx"]["discriminator"].strip("'")
+        members = filter(_is_model, get_args(_bare(_annotation_at(schema, fault["loc"]))))
+        tags = ", ".join(f"'{tag}'" for member in members for tag in _own_tags(member, key))
+        return f"{path}: found {_shown(fault['input'])}; the key '{key}' is missing, which is one of {tags}"
     return f"{path}: found {_shown(fault['input'])}{f', {note}' if note else ''}; {_demand(fault)}"
 
 
@@ -113,8 +118,6 @@ def _demand(fault: ErrorDetails) -> str:
         return f"`{context['discriminator'].strip(chr(39))}` must be one of {context['expected_tags']}" + suggestion(
             context["tag"], [tag.strip(" '") for tag in context["expected_tags"].split(",")]
         )
-    if kind == "union_tag_not_found":
-        return f"the key {context['discriminator']} is missing"
     if kind == "too_short":
         return f"must have at least {context['min_length']} entries, has {context['actual_length']}"
     if kind == "too_long":
@@ -201,6 +204,11 @@ def _tags(member: Any) -> tuple[Any, ...]:
         return ()
     choices = [field.annotation for field in member.model_fields.values() if get_origin(field.annotation) is Literal]
     return tuple(tag for choice in choices for tag in get_args(choice))
+
+
+def _own_tags(member: Any, key: str) -> tuple[Any, ...]:
+    """Return the values of one key by which a member of a discriminated union is chosen."""
+    return get_args(member.model_fields[key].annotation)
 
 
 def _is_model(annotation: Any) -> bool:

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from bilayer_core.errors import SceneError
 from bilayer_core.printable import shortened
-from bilayer_core.scene.bundled import bundled_scene, is_file_name
+from bilayer_core.scene.bundled import bundled_scene, bundled_scenes, is_file_name
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.faults import tell
 from bilayer_core.scene.limits import LARGEST_FILE, check_content, read_text
@@ -54,7 +54,9 @@ def read_scene_file(path: Path) -> str:
     try:
         return read_text(path, LARGEST_FILE)
     except ValueError as error:
-        raise SceneError(f"{str(path)!r}: {error}" if "\0" in str(path) else f"{path}: {error}") from None
+        known = path.stem in bundled_scenes() and len(path.parts) == 1 and not path.exists()
+        hint = f"; `{path.stem}` without {path.suffix} is a bundled scene" if known else ""
+        raise SceneError(f"{str(path)!r}: {error}" if "\0" in str(path) else f"{path}: {error}{hint}") from None
 
 
 def parse_scene(text: str, source: str, overrides: Overrides = (), directory: Path = Path()) -> SceneConfig:

@@ -110,7 +110,17 @@ def read_yaml(text: str, source: str) -> Any:
 def _problem(error: yaml.MarkedYAMLError) -> str:
     tag = "could not determine a constructor for the tag "
     problem = str(error.problem)
-    return f"the tag {problem.removeprefix(tag)} means nothing in a scene" if problem.startswith(tag) else problem
+    if problem.startswith(tag):
+        return f"the tag {problem.removeprefix(tag)} means nothing in a scene"
+    return next((f"{problem}; {remedy}" for part, remedy in REMEDIES.items() if part in problem), problem)
+
+
+REMEDIES = {
+    "tab character": "lines are indented with spaces",
+    "cannot start any token": "lines are indented with spaces, and text with special characters needs quotes",
+    "mapping values are not allowed": "text with a colon needs quotes, such as title: 'Gripper: first trial'",
+}
+"""Of faults that the reader's words do not help to mend, by a part of these."""
 
 
 def _refuse_deep(text: str, source: str) -> None:

@@ -170,6 +170,7 @@ def test_a_scene_that_starts_in_penetration_is_refused_with_the_node_and_the_dep
     ("arguments", "message"),
     [
         (["run", "griping"], "bilayer: griping: neither a scene file nor a bundled scene, did you mean gripping?"),
+        (["run", "gripping.yaml"], "No such file or directory; `gripping` without .yaml is a bundled scene"),
         (["run", "absent.yaml"], "bilayer: absent.yaml: cannot be read: No such file or directory"),
         (["run", "cantilever", "--dt", "1 kg"], 'solver.dt: found "1 kg", a quantity in kg; must be a time [s]'),
         (["run", "cantilever", "--dt", "nan"], 'solver.dt: found "nan", not a number with a unit; must be a time [s]'),

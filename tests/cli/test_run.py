@@ -146,6 +146,16 @@ def test_the_log_holds_the_scene_with_all_changes(here):
     assert parse_scene(scene_from_log("run.mcap"), "log") == load_scene("cantilever", changes)
 
 
+def test_stimuli_and_loads_may_be_given_in_place_of_their_schedules(here, capsys):
+    assert (
+        main(["run", "bending", "--duration", "0.1", "--quiet", "--log", "a.mcap", "--stimulus", "swelling=0.5"]) == 0
+    )
+    assert set(read_log("a.mcap")["stimulus/swelling"].values.ravel()[1:]) == {0.5}
+    assert main(["replay", "a.mcap", "--verify"]) == 0
+    assert main(["run", "bending", "--stimulus", "heat=0.5"]) == 2
+    assert "heat" in capsys.readouterr().err
+
+
 def test_quiet_prints_nothing(here, capfd):
     assert main(["run", "cantilever", "--duration", "0.002", "--quiet"]) == 0
     assert capfd.readouterr() == ("", "")

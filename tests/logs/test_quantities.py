@@ -143,13 +143,26 @@ def test_the_command_tells_the_largest_first(bent, capsys):
     half, whole = str(bent / "half.mcap"), str(bent / "whole.mcap")
     assert main(["compare", half, str(bent / "again.mcap")]) == 0
     assert "equal to the last bit of the logs" in capsys.readouterr().out
-    assert main(["compare", half, whole]) == 0
+    assert main(["compare", half, whole]) == 1
     first, _, *lines = capsys.readouterr().out.splitlines()
     parts = [float(line.split(" s")[0].split()[-2]) for line in lines]
     assert first.startswith("t = 0 to 0.4 s") and len(parts) > 5 and parts == sorted(parts, reverse=True)
-    assert main(["compare", half, whole, "--json"]) == 0
+    assert main(["compare", half, whole, "--json"]) == 1
     told = json.loads(capsys.readouterr().out)
     assert told["equal"] is False and {"name", "largest", "time", "part"} <= set(told["differences"][0])
+
+
+def test_a_run_that_ends_earlier_is_not_equal_to_the_longer_one(bent, tmp_path, capsys):
+    shorter = tmp_path / "shorter.mcap"
+    simulator = Simulator(load_scene("bending"))
+    simulator.set_stimulus(next(iter(simulator.scene.stimuli)), 0.5)
+    simulator.run(0.2, observers=[McapRecorder(shorter, rate=50.0)])
+    found = compare(shorter, bent / "half.mcap")
+    assert not found.equal and all(of.largest == 0.0 for of in found.differences)
+    assert main(["compare", str(shorter), str(bent / "half.mcap")]) == 1
+    told = capsys.readouterr().out
+    assert f"{shorter} has t = 0 to 0.2 s" in told and "half.mcap has t = 0 to 0.4 s" in told
+    assert "equal to the last bit of the logs, as far as both go" in told
 
 
 def test_every_term_of_energy_has_a_name_that_logs_are_read_with(tmp_path):

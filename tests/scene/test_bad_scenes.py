@@ -74,7 +74,16 @@ MOVE = {"type": "prescribed", "times": [0], "displacements": [[0, 0, 0]]}
             "end_radius: found 1.0; must differ from `start_radius`; with equal radii it is an `arc`",
         ),
         ("contact.rods", "sometimes", "found \"sometimes\"; must be 'auto', "),
-        ("stimuli.humidity.schedule", {"value": 1}, "found {\"value\": 1}; the key 'type' is missing"),
+        (
+            "stimuli.humidity.schedule",
+            {"value": 1},
+            "found {\"value\": 1}; the key 'type' is missing, which is one of 'hold', ",
+        ),
+        (
+            "rods.arm.path",
+            {"length": 1},
+            "found {\"length\": 1}; the key 'shape' is missing, which is one of 'straight'",
+        ),
         (
             "rods.arm.layers.active.material",
             "gell",

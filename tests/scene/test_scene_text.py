@@ -52,6 +52,15 @@ def test_the_text_states_the_values_that_the_scene_left_out():
 
 
 @pytest.mark.parametrize(
+    ("text", "remedy"),
+    [("a: 1\n\tb: 2\n", "indented with spaces"), ("title: a: b\n", "text with a colon needs quotes")],
+)
+def test_common_slips_are_told_with_their_remedy(text, remedy):
+    with pytest.raises(SceneError, match=remedy):
+        parse_scene(text, "scene.yaml")
+
+
+@pytest.mark.parametrize(
     ("text", "message"),
     [
         ("schema: 1\nname: a\nname: b\n", "scene.yaml:3:1: is not readable YAML: the key 'name' occurs twice"),

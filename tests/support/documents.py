@@ -47,7 +47,7 @@ def pasted(block: Block, known: dict, environment: dict[str, str] | None = None)
                 shell = subprocess.run(["bash", "-e", "-c", text], env=environment, capture_output=True, text=True)
                 code = shell.returncode
                 print(shell.stdout, shell.stderr)
-            if code:
+            if code and not (code == 1 and words[:2] == ["bilayer", "compare"]):  # by which it says that runs differ
                 return code, told.getvalue()
     return 0, told.getvalue()
 

@@ -1,11 +1,14 @@
 """Searches: they find what is known, go on after a kill, and confirm what they found."""
 
+from dataclasses import replace
+
 import pytest
 import yaml
 from support.sweep_programs import STRIP
 
 from bilayer_core import load_scene, optimise
 from bilayer_core.cli import main
+from bilayer_core.cli.optimise import lines
 from bilayer_core.errors import InputError
 from bilayer_core.studies.sweeps.journal import Journal
 from bilayer_core.studies.sweeps.optimise import Search, finer_job
@@ -84,6 +87,9 @@ def test_a_search_on_processes_is_confirmed_resumed_and_written(ranges, cluster,
     assert abs(first.difference) < 0.02
     second = optimise(ranges, "curvature", trials=20, resume=True, **options)
     assert len(seen) == second.trials == 20 and second.value >= first.value
+    assert (second.at_end == ("gain",)) == (second.best.parameters["gain"] > 1.985)
+    told = lines(replace(second, at_end=("gain",)))
+    assert [line.endswith("at an end of its range: a wider one may have better") for line in told[1:3]] == [True, False]
     scene = load_scene(tmp_path / "best.yaml")
     layer = scene.rods[0].layers[1]
     assert layer.eigenstrain[0].gain == pytest.approx(second.best.parameters["gain"] / 100.0)

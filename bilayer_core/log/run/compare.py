@@ -57,16 +57,24 @@ class Comparison:
         Quantities that only the first run has, and only the second one.
     span : tuple of float
         From when to when both have values [s].
+    spans : tuple of tuple of float
+        From when to when the first has, and the second one.
     """
 
     differences: tuple[QuantityDifference, ...]
     only: tuple[tuple[str, ...], tuple[str, ...]]
     span: tuple[float, float]
+    spans: tuple[tuple[float, float], tuple[float, float]]
 
     @property
     def equal(self) -> bool:
-        """True if all quantities are the same, to the last bit that logs keep."""
-        return not any(self.only) and all(found.largest == 0.0 for found in self.differences)
+        """True if both are as long and all quantities are the same, to the last bit that logs keep."""
+        return self.as_long and not any(self.only) and all(found.largest == 0.0 for found in self.differences)
+
+    @property
+    def as_long(self) -> bool:
+        """True if both begin and end at the same times."""
+        return all(abs(mine - other) <= SAME_TIME for mine, other in zip(*self.spans, strict=True))
 
     def __getitem__(self, name: str) -> QuantityDifference:
         """Return the difference of a quantity.
@@ -132,7 +140,13 @@ def compare(first: Recorded | str | Path, second: Recorded | str | Path) -> Comp
         tuple(found[name] for name in both),
         (tuple(name for name in mine if name not in others), tuple(name for name in others if name not in mine)),
         (float(begin), float(end)),
+        (_span(one), _span(other)),
     )
+
+
+def _span(run: Recorded) -> tuple[float, float]:
+    """Return from when to when a run has frames [s]."""
+    return float(run.times[0]), float(run.times[-1])
 
 
 class _Rows:

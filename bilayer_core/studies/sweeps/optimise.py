@@ -56,6 +56,8 @@ class Optimum:
         All runs of the search.
     units : dict
         Of parameters that have one.
+    at_end : tuple of str
+        Parameters whose value is within a hundredth of their range from an end of it.
     """
 
     metric: str
@@ -64,6 +66,7 @@ class Optimum:
     start: float | None
     trials: int
     units: dict[str, str]
+    at_end: tuple[str, ...] = ()
 
     @property
     def value(self) -> float:
@@ -315,7 +318,8 @@ def _confirm(search: Search, engine: Engine, rows: list[Row]) -> Optimum:
     optima = []
     for row in ranked[:MOST_CANDIDATES]:
         value = _finer(search, engine, row)
-        optima.append(Optimum(search.metric, row, value, start, len(rows), search.sweep.job.units))
+        ends = tuple(name for name, of in search.sweep.spec.parameters.items() if of.is_end(row.parameters[name]))
+        optima.append(Optimum(search.metric, row, value, start, len(rows), search.sweep.job.units, ends))
         if optima[-1].is_confirmed:
             return optima[-1]
     return optima[0]

@@ -56,6 +56,10 @@ Function = Annotated[str, Field(pattern=r"^[^:]+:[A-Za-z_][A-Za-z0-9_]*$", max_l
 MemorySize = Annotated[float, *real("a memory size", "byte", "2 GB", above=0.0)]
 
 
+NEAR_END = 0.01
+"""Part of its range by which a value is at an end of it."""
+
+
 class Parameter(Part):
     """Quantity that a sweep varies: by `values`, or over a range."""
 
@@ -93,6 +97,13 @@ class Parameter(Part):
     def ends(self) -> tuple[float, float]:
         """Ends of its range, in its unit."""
         return self.from_.value, self.in_unit(self.to)
+
+    def is_end(self, value: Any) -> bool:
+        """Return whether a value is at an end of the range, or nearer to it than a hundredth of the range."""
+        if self.values is not None:
+            return False
+        begin, end = self.ends
+        return min(abs(value - begin), abs(value - end)) <= NEAR_END * abs(end - begin)
 
     @cached_property
     def levels(self) -> list[Any] | None:
