@@ -184,8 +184,9 @@ class GapCheck:
         their radii.
         """
         bound, radii = sheet.apart_at_least(first, second)
-        near = np.flatnonzero(bound < self._model.scene.contact.barrier_distance)
-        bound[near] = sheet.apart_if_flat(first[near], second[near]) - radii[near]
+        unit = self._model.scene.contact.barrier_distance
+        near = np.flatnonzero(bound < unit)
+        bound[near] = sheet.apart_if_flat(first[near], second[near], unit + radii[near]) - radii[near]
         return bound, radii
 
     def _surface_gaps(self, sheet: Sheet, at: Moment, enough: float) -> list[float]:

@@ -32,11 +32,23 @@ class Rectangles:
         return self.middle[:, None] + SIGNS @ self.half
 
 
-def apart(first: Rectangles, second: Rectangles) -> Array:
-    """Return the distance of each pair [m], shape (n,)."""
+def apart_at_least(first: Rectangles, second: Rectangles) -> Array:
+    """Return a lower bound of the distance of each pair [m], shape (n,): along the line of their middles and across
+    each of them.
+    """
+    away, halves = second.middle - first.middle, np.concatenate([first.half, second.half], axis=1)
+    along = np.stack([away, *(np.cross(of.half[:, 0], of.half[:, 1]) for of in (first, second))])
+    reach = np.abs(np.einsum("knd,njd->knj", along, halves))
+    size = np.maximum(np.linalg.norm(along, axis=2), 1e-300)
+    return ((np.abs((along * away).sum(axis=2)) - reach.sum(axis=2)) / size).max(axis=0, initial=0.0)
+
+
+def apart(first: Rectangles, second: Rectangles, enough: Array | float = np.inf) -> Array:
+    """Return the distance of each pair [m], shape (n,), or a lower bound that is not below `enough`."""
+    found = apart_at_least(first, second)
     wide = np.abs(first.half[:, 1]).max(axis=1) + np.abs(second.half[:, 1]).max(axis=1) > 0.0
-    found = np.empty(len(wide))
-    for chosen, lines in ((wide, False), (~wide, True)):
+    near = found < enough
+    for chosen, lines in ((near & wide, False), (near & ~wide, True)):
         if not chosen.any():
             continue
         one, other = first.of(chosen), second.of(chosen)
@@ -46,10 +58,9 @@ def apart(first: Rectangles, second: Rectangles) -> Array:
             continue
         least = np.minimum(_from_corners(one, other), _from_corners(other, one))
         a, b = one.corners, other.corners
-        for i in range(4):
-            for j in range(4):
-                sides = a[:, i], a[:, (i + 1) % 4], b[:, j], b[:, (j + 1) % 4]
-                least = np.minimum(least, _of_lines(*sides))
+        sides = (a[:, :, None], np.roll(a, -1, axis=1)[:, :, None], b[:, None], np.roll(b, -1, axis=1)[:, None])
+        lines = (np.broadcast_to(of, (len(a), 4, 4, 3)).reshape(-1, 3) for of in sides)
+        least = np.minimum(least, _of_lines(*lines).reshape(len(a), 16).min(axis=1))
         found[chosen] = np.where(_cut(one, other) | _cut(other, one), 0.0, least)
     return found
 
@@ -65,7 +76,7 @@ def _from_corners(one: Rectangles, other: Rectangles) -> Array:
 def _of_lines(a: Array, b: Array, c: Array, d: Array) -> Array:
     """Return the distance of segments ab and cd, each of shape (n, 3)."""
     u, v, w = b - a, d - c, a - c
-    uu, uv, vv, uw, vw = ((p * q).sum(axis=1) for p, q in ((u, u), (u, v), (v, v), (u, w), (v, w)))
+    uu, uv, vv, uw, vw = (np.einsum("nd,nd->n", p, q) for p, q in ((u, u), (u, v), (v, v), (u, w), (v, w)))
     across = uu * vv - uv * uv
     s = np.where(across > 1e-12 * uu * vv, (uv * vw - vv * uw) / np.maximum(across, 1e-300), 0.0)
     s = np.clip(s, 0.0, 1.0)

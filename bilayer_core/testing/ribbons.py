@@ -20,7 +20,7 @@ import numpy as np
 
 from bilayer_core.model.model import Model
 from bilayer_core.observed.frame import Frame
-from bilayer_core.testing.rectangles import Rectangles, apart
+from bilayer_core.testing.rectangles import Rectangles, apart, apart_at_least
 from bilayer_core.testing.surfaces import MetSurface
 
 Array = np.ndarray
@@ -190,26 +190,34 @@ class Sheet:
         along_way, across_way, _, _ = self.ways()
         edges = np.arange(len(self.radius))
         middle, _ = self.at(edges, np.full(len(edges), 0.5), np.zeros(len(edges)))
-        size, radius = 0.5 * along_way + across_way, self.radius.max(axis=1)
-        radii = radius[first] + radius[second]
-        return np.linalg.norm(middle[first] - middle[second], axis=1) - size[first] - size[second] - radii, radii
+        radius = self.radius.max(axis=1)
+        size, way = 0.5 * along_way + across_way + radius, middle[first] - middle[second]
+        return np.sqrt(np.einsum("nd,nd->n", way, way)) - size[first] - size[second], radius[first] + radius[second]
 
-    def apart_if_flat(self, first: Array, second: Array) -> Array:
-        """Return the distance of the middle sheets of each pair of edges as if these were flat [m]."""
-        flat = []
-        for edge in (first, second):
-            half = np.full(len(edge), 0.5)
-            flat.append(self.flat(edge, half, 0.0 * half, half, 2.0 * half)[0])
-        return apart(*flat)
+    def whole(self) -> tuple[Rectangles, Array]:
+        """Return a rectangle that touches the sheet in the middle of each edge, and how far these are askew [m]."""
+        half = np.full(len(self.radius), 0.5)
+        return self.flat(np.arange(len(half)), half, 0.0 * half, half, 2.0 * half)
+
+    def apart_if_flat(self, first: Array, second: Array, enough: Array) -> Array:
+        """Return the distance of the middle sheets of each pair of edges as if these were flat [m], or a lower bound
+        that is not below `enough`.
+        """
+        flat, _ = self.whole()
+        return apart(flat.of(first), flat.of(second), enough)
 
     def apart(self, first: Array, second: Array, unit: float, enough: float) -> float:
         """Return the least gap between pairs of stretches [m], or a lower bound if that is above `enough`."""
         _, across_way, bend, turn = self.ways()
-        pieces = []
+        flat, askew = self.whole()
+        around = 0.125 * bend + 0.5 * turn + askew + self.radius.max(axis=1)
+        low = apart_at_least(flat.of(first), flat.of(second)) - around[first] - around[second]
+        near = low < enough
+        first, second, pieces = first[near], second[near], []
         for edge in (first, second):
             wide = np.where(across_way[edge] > 0.0, 1.0, 0.0)
             pieces.append([edge, np.full(len(edge), 0.5), np.zeros(len(edge)), np.full(len(edge), 0.5), wide])
-        least = bound = math.inf
+        least, bound = math.inf, float(low[~near].min(initial=math.inf))
         while pieces[0][0].size:
             flat, left, radii = [], [], np.zeros(pieces[0][0].size)
             for edge, along, across, step, half in pieces:
