@@ -103,7 +103,7 @@ def test_linked_rings_of_unlike_layers_hang_in_each_other_with_their_faces(model
         materials={"gel": GEL, "paper": {**GEL, "youngs_modulus": 1e8}},
         solver={"dt": None},
     )
-    run = run_scene(content, 0.2, model=model)
+    run = run_scene(content, 0.1, model=model)
     run.assert_sound()
     assert 0.0 < run.smallest_gap < 2e-4
 

@@ -89,8 +89,8 @@ def test_an_error_that_no_user_may_see_fails_a_case():
 )
 def test_each_limit_of_the_judge_fails_a_case_that_is_beyond_it(limit, value, words, monkeypatch):
     monkeypatch.setattr(judging, limit, value)
-    case = case_of(robot="drop", stations=11, compared=False)
-    record = execute(StressCase(case.name, case.content, budget=True))
+    case = case_of(robot="drop", stations=11)
+    record = execute(StressCase(case.name, case.content, most_steps=20, budget=True))
     assert record.outcome is Outcome.FAILED
     assert words in record.reason
 

@@ -1,5 +1,6 @@
 """The judge's own check of gaps: it agrees with the engine, and it sees what an engine must never do."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -25,9 +26,11 @@ def simulator_of(name):
 )
 def test_the_engine_s_smallest_gap_is_found_again(robot, model):
     simulator = simulator_of(f"integrator/sdirk2/{robot}/{model}/3")
-    check, smallest = GapCheck(simulator.model), []
+    check, smallest, steps = GapCheck(simulator.model), [], itertools.count()
 
     def look(time):
+        if next(steps) % 3:
+            return
         frame = simulator.frame()
         smallest.append((check.smallest(check.moment(frame)), frame.min_gap))
 
@@ -43,7 +46,7 @@ def test_near_pairs_of_very_many_edges_are_those_of_all(kind):
     simulator = simulator_of(f"integrator/sdirk2/pile/{kind}/3")
     model = simulator.model
     few, many = PairsOfEdges(model), PairsOfEdges(model, most=0)
-    simulator.run()
+    simulator.run(0.1 * simulator.scene.duration)
     nodes = simulator.frame().positions[: model.node_count]
     middle = 0.5 * (nodes[model.rods.edge_node] + nodes[model.rods.edge_node + 1])
     first, second = few.at(nodes)

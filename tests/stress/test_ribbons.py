@@ -66,3 +66,6 @@ def test_the_distance_of_rectangles_is_that_of_least_squares():
     found = apart(one, other)
     np.testing.assert_allclose(found, expected, atol=1e-9)
     assert 0 < (found == 0.0).sum() < 60
+    enough = apart(one, other, 0.5)
+    assert np.all((enough == found) | (enough >= 0.5)) and np.all(enough <= found + 1e-12)
+    assert (enough < found).any()

@@ -14,6 +14,10 @@ from bilayer_core.verification.stress.torture import torture_cases
 
 QUICK = 100
 """Cases of a quick run."""
+LONG_STEP = "all/1154"
+"""A case too long for a quick run: with a barrier of 87 thicknesses all rods feel each other, and its first step takes
+46 s of CPU time, within which no limit is asked.
+"""
 QUICK_STEPS, QUICK_LIMIT = 300, 3.0
 """Accepted steps and CPU time [s] of a case of a quick run."""
 CHOSEN = 0.2
@@ -61,4 +65,4 @@ def quick_names() -> frozenset[str]:
     for group in groups.values():
         count = max(1, round(QUICK * len(group) / total))
         names += chosen.choice(group, size=min(count, len(group)), replace=False).tolist()
-    return frozenset(names)
+    return frozenset(names) - {LONG_STEP}
