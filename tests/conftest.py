@@ -1,6 +1,7 @@
 """Surroundings of all tests: a kernel cache of their own, and ROS 2 on this machine alone."""
 
 import ctypes
+import gc
 import os
 from pathlib import Path
 
@@ -35,6 +36,17 @@ def pytest_configure(config):
 
         if not is_complete():
             compile_all()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Collect tests without looks for garbage, a quarter of the CPU time, and leave them out of later looks."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_collection_modifyitems(items):
