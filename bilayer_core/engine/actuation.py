@@ -178,11 +178,13 @@ def _follow_paths(paths, time, position, rotation, rates):
 
 @kernel
 def stimulus_has_jumped(drives, state, first, ranges, h):
-    """Return whether a stimulus has jumped that some layer follows at once in a step of length `h` [s]."""
-    for k in range(drives.law_channel.shape[0]):
-        channel = drives.law_channel[k]
-        change = first[channel] - state.transduction[k]
-        lag = drives.law_rising[k] if change > 0.0 else drives.law_falling[k]
+    """Return whether a stimulus has jumped that some layer follows at once in a step of length `h` [s]. Of a layer with
+    diffusion the slowest mode decides: what its face takes up at once is little of the layer.
+    """
+    for k in range(drives.field_channel.shape[0]):
+        channel, m = drives.field_channel[k], drives.field_slowest[k]
+        change = first[channel] - state.transduction[m]
+        lag = drives.mode_rising[m] if change > 0.0 else drives.mode_falling[m]
         if abs(change) > NO_JUMP * ranges[channel] and lag < AT_ONCE * h:
             return True
     return False

@@ -39,7 +39,7 @@ The account is part of the state, so that a run that is continued makes the same
 from __future__ import annotations
 
 from bilayer_core.engine.kinetic import kinetic_energy
-from bilayer_core.engine.laws import eigenstrain_of
+from bilayer_core.engine.laws import write_strains_of_laws
 from bilayer_core.engine.powers import BY_FLOW, in_barriers, write_forces_of_laws
 from bilayer_core.forces.added_mass import fluid_momentum, move_fluid
 from bilayer_core.forces.inertia import second_moment_beyond
@@ -136,13 +136,11 @@ def open_account(p, state, stage, at):
 @piece(int, Problem, StateArrays, StageInputs, Work, float)
 def begin_step_account(p, state, inputs, work, weight):
     """Begin with a step from a state; `weight` is that of the powers there [s]."""
-    drives, work_done = p.drives, work.account
+    work_done = work.account
     work_done.supplied, work_done.lost = weight * state.account[POWER_SUPPLIED], weight * state.account[POWER_LOST]
     work_done.taken_up = weight * state.account[POWER_BARRIER]
     work_done.driven, work_done.jumped = 0, False
-    for i in range(work.start_strain.shape[0]):
-        law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
-        work.start_strain[i] = eigenstrain_of(state.transduction[i], law[0], law[1], law[2])
+    write_strains_of_laws(p.drives, state.transduction, work.start_strain)
     _supply_by_jumps(p, state, inputs, work)
     for i in range(work.mean_force.shape[0]):
         work.mean_force[i] = weight * work.start_force[i]
@@ -157,16 +155,18 @@ def _supply_by_jumps(p, state, inputs, work):
     drives, strands, stage, done = p.drives, p.strands, work.stage, work.account
     copy(state.law_force, work.start_force)
     jumps = False
-    for i in range(work.start_strain.shape[0]):
-        work.strain[i] = 0.0
-        stimulus = inputs.first[drives.law_channel[i]]
-        lag = drives.law_rising[i] if stimulus > state.transduction[i] else drives.law_falling[i]
-        if lag == 0.0 and stimulus != state.transduction[i]:
-            law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
-            work.strain[i] = eigenstrain_of(stimulus, law[0], law[1], law[2]) - work.start_strain[i]
+    copy(state.transduction, work.transduction)
+    for f in range(drives.field_channel.shape[0]):
+        stimulus, m = inputs.first[drives.field_channel[f]], drives.field_slowest[f]
+        lag = drives.mode_rising[m] if stimulus > state.transduction[m] else drives.mode_falling[m]
+        if lag == 0.0 and stimulus != state.transduction[m]:
+            work.transduction[m] = stimulus
             jumps = True
     if not jumps:
         return
+    write_strains_of_laws(drives, work.transduction, work.strain)
+    for i in range(work.start_strain.shape[0]):
+        work.strain[i] -= work.start_strain[i]
     stage.rest_edge[:], stage.rest_joint[:, 0] = 0.0, 0.0  # scratch until a stage begins
     for k in range(drives.driven_edge.shape[0]):
         stage.rest_edge[drives.driven_edge[k]] += drives.driven_weight[k] * work.strain[drives.driven_law[k]]

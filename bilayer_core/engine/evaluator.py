@@ -145,7 +145,7 @@ class Evaluator:
     # stages
 
     def rest_strains_of(self, transduction: Array) -> RestStrains:
-        """Return the strains without stress from the stimuli that materials have reached, shape (n_law,)."""
+        """Return the strains without stress from the stimuli that modes have reached, shape (n_mode,)."""
         self._state.transduction[:] = transduction
         write_rest_strains(self.problem, self._arrays, self._work)
         stage = self.stage

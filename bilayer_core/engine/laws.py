@@ -1,4 +1,4 @@
-"""Formulas of scenes that kernels evaluate as well, compiled."""
+"""Formulas of scenes that kernels evaluate as well, compiled, and the eigenstrain of laws by them."""
 
 from __future__ import annotations
 
@@ -8,3 +8,16 @@ from bilayer_core.scene import spans, transduction
 value_of_span = kernel(spans.value_of_span)
 lagged = kernel(transduction.lagged)
 eigenstrain_of = kernel(transduction.eigenstrain_of)
+
+
+@kernel
+def write_strains_of_laws(drives, reached, strain_out):
+    """Write the eigenstrain of each law where modes have reached some stimuli: that of the weighted sum over the modes
+    of its field (`scene.diffusion_modes`).
+    """
+    for i in range(drives.law_gain.shape[0]):
+        first, weights, filtered = drives.field_first[drives.law_field[i]], drives.law_first[i], 0.0
+        for k in range(drives.law_first[i + 1] - weights):
+            filtered += drives.law_weight[weights + k] * reached[first + k]
+        law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
+        strain_out[i] = eigenstrain_of(filtered, law[0], law[1], law[2])

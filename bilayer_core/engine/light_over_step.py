@@ -11,6 +11,7 @@ the part O(h) is wrong by O(h): second order as well. In the first step of a run
 often.) Within a step the shape does not act on the light, so Newton's method has the potential that it has without.
 Velocities at the start would foretell the light as well, but in a vibration too fast for the step they lead far beyond
 what comes, and the light then drives it; what was seen at two instants does not.
+Where a layer follows by diffusion, all this holds for each mode of its field.
 
 Adaptive steps compare the light at the end of a step with what was foreseen. What the difference δb would have made of
 a law's filtered stimulus, had it grown linearly, is (1 − φ) s δb (`scene.transduction`); times the gain it is a free
@@ -47,11 +48,11 @@ def _take_state(light, state):
 
 @kernel
 def _see(light, rate, elapsed, column):
-    """Write what laws see a time after the start of the step [s]."""
+    """Write what fields see a time after the start of the step [s]."""
     for k in range(light.law.shape[0]):
         facing = light.facing[k, 0] + elapsed * rate[k, 0]
         visible = min(max(light.visible[k, 0] + elapsed * rate[k, 1], 0.0), 1.0)
-        light.seen[light.law[k], column] = brightness(light.side[k], facing, visible)
+        light.seen[light.field[k], column] = brightness(light.side[k], facing, visible)
 
 
 @piece(int, Problem, StateArrays)
@@ -65,7 +66,7 @@ def begin_light(p, state):
 
 @kernel
 def see_light(light, state, elapsed):
-    """Write into `seen` what laws see at the start of the step and at a time in it [s]."""
+    """Write into `seen` what fields see at the start of the step and at a time in it [s]."""
     _see(light, state.light_rate, elapsed, 1)
 
 
@@ -84,11 +85,14 @@ def end_light(p, state, inputs, n, h):
     shine(light, 1)
     square = 0.0
     for k in range(light.law.shape[0]):
-        i = light.law[k]
-        missed = brightness(light.side[k], light.facing[k, 1], light.visible[k, 1]) - light.seen[i, 1]
-        lag = min(drives.law_rising[i], drives.law_falling[i])
-        missed = lagged(0.0, 0.0, missed * inputs.stimulus[n, drives.law_channel[i]], lag, lag, h)
-        square += (light.slenderness[k] * drives.law_gain[i] * missed) ** 2
+        i, f, strained = light.law[k], light.field[k], 0.0
+        missed = brightness(light.side[k], light.facing[k, 1], light.visible[k, 1]) - light.seen[f, 1]
+        missed *= inputs.stimulus[n, drives.field_channel[f]]
+        for m in range(drives.field_first[f], drives.field_first[f + 1]):
+            lag = min(drives.mode_rising[m], drives.mode_falling[m])
+            weight = drives.law_weight[drives.law_first[i] + m - drives.field_first[f]]
+            strained += weight * lagged(0.0, 0.0, missed, lag, lag, h)
+        square += (light.slenderness[k] * drives.law_gain[i] * strained) ** 2
         rate[k, 0] = (light.facing[k, 1] - light.facing[k, 0]) / h
         rate[k, 1] = (light.visible[k, 1] - light.visible[k, 0]) / h
     return math.sqrt(square / light.law.shape[0])

@@ -7,7 +7,7 @@ import math
 from bilayer_core.contact.crossing import crossing, note_start
 from bilayer_core.engine.configuration import take_state
 from bilayer_core.engine.energy_account import begin_step_account, close_step_account
-from bilayer_core.engine.laws import eigenstrain_of, lagged
+from bilayer_core.engine.laws import lagged, write_strains_of_laws
 from bilayer_core.engine.light_over_step import begin_light, end_light, see_light
 from bilayer_core.engine.newton import first_guess_of, minimise_potential
 from bilayer_core.engine.potential import end_forces, start_stage
@@ -90,15 +90,15 @@ def drive_stage(p, state, inputs, n, work):
     drives, stage, transduction, strain = p.drives, work.stage, work.transduction, work.strain
     if p.light.exists:
         see_light(p.light, state, inputs.elapsed[n])
-    for i in range(drives.law_channel.shape[0]):
-        channel = drives.law_channel[i]
+    for f in range(drives.field_channel.shape[0]):
+        channel = drives.field_channel[f]
         first, last = inputs.first[channel], inputs.stimulus[n, channel]
         if p.light.exists:
-            first, last = first * p.light.seen[i, 0], last * p.light.seen[i, 1]
-        lags = drives.law_rising[i], drives.law_falling[i]
-        transduction[i] = lagged(state.transduction[i], first, last, lags[0], lags[1], inputs.elapsed[n])
-        law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
-        strain[i] = eigenstrain_of(transduction[i], law[0], law[1], law[2])
+            first, last = first * p.light.seen[f, 0], last * p.light.seen[f, 1]
+        for m in range(drives.field_first[f], drives.field_first[f + 1]):
+            lags = drives.mode_rising[m], drives.mode_falling[m]
+            transduction[m] = lagged(state.transduction[m], first, last, lags[0], lags[1], inputs.elapsed[n])
+    write_strains_of_laws(drives, transduction, strain)
     _grow(drives, strain, stage.rest_edge, stage.rest_joint)
     for i in range(stage.load_factor.shape[0]):
         stage.load_factor[i] = inputs.load_factor[n, i]
@@ -108,11 +108,8 @@ def drive_stage(p, state, inputs, n, work):
 @piece(int, Problem, StateArrays, Work)
 def write_rest_strains(p, state, work):
     """Write the eigenstrain of laws and the rest strains of a state to `work`, from what its materials have reached."""
-    drives, strain = p.drives, work.strain
-    for i in range(drives.law_channel.shape[0]):
-        law = drives.law_gain[i], drives.law_reference[i], drives.law_saturation[i]
-        strain[i] = eigenstrain_of(state.transduction[i], law[0], law[1], law[2])
-    _grow(drives, strain, work.stage.rest_edge, work.stage.rest_joint)
+    write_strains_of_laws(p.drives, state.transduction, work.strain)
+    _grow(p.drives, work.strain, work.stage.rest_edge, work.stage.rest_joint)
     return READY
 
 

@@ -81,7 +81,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         rods=rods,
         viscosity=_viscosity(found) if "viscosity" in forces else Viscosity.absent(),
         drives=drives,
-        light=build_light(scene, found, placed, rods, drives.law_channel),
+        light=build_light(scene, found, placed, rods, drives),
         plane=Plane.absent() if plane is None else _plane(plane, found, placed, rods),
         off_axis=OffAxis.absent() if bonds.exists else _off_axis(found, rods, strain_coupling),
         bonds=bonds,
@@ -157,8 +157,11 @@ def _viscosity(found: Collected) -> Viscosity:
 
 
 def _drives(found: Collected) -> Drives:
-    channel, *numbers = np.array(found.laws, dtype=float).reshape(-1, 6).T.copy()
-    laws = ("law_rising", "law_falling", "law_gain", "law_reference", "law_saturation")
+    lags = [np.array(of, dtype=float) for _, of in found.fields]
+    first = np.cumsum([0, *map(len, lags)])
+    rising, falling = np.concatenate([np.zeros((0, 2)), *lags]).T.copy()
+    weights = [weight for _, weight, *_ in found.laws]
+    numbers = np.array([own[2:] for own in found.laws], dtype=float).reshape(-1, 3).T.copy()
     return Drives(
         rest_strain=found.column("rest_strain"),
         joint_rest=_of_joints(found, "joint_rest", width=3),
@@ -166,8 +169,15 @@ def _drives(found: Collected) -> Drives:
             f"driven_{name}": found.column(f"driven_{name}", np.int64) for name in ("edge", "law", "joint", "joint_law")
         },
         **{f"driven_{name}": found.column(f"driven_{name}") for name in ("weight", "joint_weight")},
-        law_channel=channel.astype(np.int64),
-        **dict(zip(laws, numbers, strict=True)),
+        field_channel=np.array([channel for channel, _ in found.fields], dtype=np.int64),
+        field_first=first.astype(np.int64),
+        field_slowest=first[:-1] + np.array([of.max(axis=1).argmax() for of in lags], dtype=np.int64),
+        mode_rising=rising,
+        mode_falling=falling,
+        law_field=np.array([at for at, *_ in found.laws], dtype=np.int64),
+        law_first=np.cumsum([0, *map(len, weights)]).astype(np.int64),
+        law_weight=np.array([part for weight in weights for part in weight], dtype=float),
+        **dict(zip(("law_gain", "law_reference", "law_saturation"), numbers, strict=True)),
     )
 
 

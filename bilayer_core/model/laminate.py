@@ -34,6 +34,7 @@ from bilayer_core.model.strands import (
     with_copies,
 )
 from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.diffusion_modes import Response, responses
 from bilayer_core.scene.pattern import stacked
 from bilayer_core.scene.profile import values_at
 from bilayer_core.scene.rod import Rod, RodCopy
@@ -286,6 +287,11 @@ def uneven_faces(rod: Rod, scene: SceneConfig) -> Iterator[Figure]:
         )
 
 
+def _on_cells(response: Response, cells: Cells) -> Array | float:
+    """Return by how much of a response each cell grows, shape (n_cell,)."""
+    return 1.0 if response.along is None else response.along[cells.edge]
+
+
 def _add_eigenstrain(
     found: Collected,
     scene: SceneConfig,
@@ -311,17 +317,25 @@ def _add_eigenstrain(
             heights = np.full(rod.stations - 1, axis)
             laws = add_lit_elements(found, scene, rod, layer, law, edges, strands[0].first_edge, heights)
             groups = [
-                (number, with_copies(rod, own)) for number, own in zip(laws.tolist(), edges[:, None], strict=True)
+                (numbers, with_copies(rod, own), 1.0)
+                for numbers, own in zip(laws.tolist(), edges[:, None], strict=True)
             ]
         else:
-            groups = [(found.law(scene, law), with_copies(rod, edges))]
-        for number, driven in groups:
-            weight, bend = whole.driven(part, covered & np.isin(cells.edge, driven))
-            weight = weight[:, driven]
-            of_edges.append((first_edge + driven, np.full(weight.shape, number), weight))
-            bent = (bend != 0.0) & (joints >= 0)
-            copy, _ = np.nonzero(bent)
-            of_joints.append((copy, joints[bent], np.full(len(copy), number), bend[bent]))
+            groups = [
+                (found.law(scene, law, response), with_copies(rod, edges), _on_cells(response, cells))
+                for response in responses(rod, layer, law)
+            ]
+        for (mean, gradient), driven, along in groups:
+            grown = along * (covered & np.isin(cells.edge, driven))
+            laws = [(mean, *whole.driven(part, grown))]
+            if gradient >= 0:
+                laws.append((gradient, *whole.driven_by_gradient(part, grown, layer.thickness)))
+            for number, weight, bend in laws:
+                weight = weight[:, driven]
+                of_edges.append((first_edge + driven, np.full(weight.shape, number), weight))
+                bent = (bend != 0.0) & (joints >= 0)
+                copy, _ = np.nonzero(bent)
+                of_joints.append((copy, joints[bent], np.full(len(copy), number), bend[bent]))
     if not of_edges:
         return
     edge, law_of_edge, weight = (np.concatenate(part, axis=1) for part in zip(*of_edges, strict=True))

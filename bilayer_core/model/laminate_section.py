@@ -279,11 +279,22 @@ class WholeSection:
         return pairs
 
     def driven(self, layer: LayerCells, driven: Array) -> tuple[Array, Array]:
-        """Return what an eigenstrain of a layer in some cells, shape (n_cell,), gives: rest strains N*/A* of all edges,
-        shape (n_copy, n_edge), and κ̄₁ of all nodes, −Σ ℓ M/D [rad], shape (n_copy, n_node).
+        """Return what an eigenstrain of a layer gives, by parts in cells, shape (n_cell,): rest strains N*/A* of all
+        edges, shape (n_copy, n_edge), and κ̄₁ of all nodes, −Σ ℓ M/D [rad], shape (n_copy, n_node).
         """
         axial = driven * layer.axial * np.ones_like(layer.ratio)
-        force, moment = self._loads(axial, -axial * layer.height)
+        return self._driven_by(axial, -axial * layer.height)
+
+    def driven_by_gradient(self, layer: LayerCells, driven: Array, thickness: float) -> tuple[Array, Array]:
+        """Return the same of an eigenstrain that grows by 1 through a layer of a thickness [m] and is 0 on average:
+        alone it would bend to −1/h, so M = −EI₁/h.
+        """
+        moment = -driven * layer.ratio * layer.bend / thickness
+        return self._driven_by(0.0 * moment, moment)
+
+    def _driven_by(self, force: Array, moment: Array) -> tuple[Array, Array]:
+        """Return rest strains of edges and κ̄₁ of nodes from what layers would bear in cells at rest [N, N m]."""
+        force, moment = self._loads(force, moment)
         part = self._rest_strains(force, moment) / self.axial_stiffness
         return part, self.to_nodes(moment / self._of_halves[2])
 

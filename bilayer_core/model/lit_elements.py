@@ -9,12 +9,13 @@ from bilayer_core.jit import UNALLOCATED, piece
 from bilayer_core.model.contact_points import owned_shapes
 from bilayer_core.model.model import Model, PlacedBodies
 from bilayer_core.model.records.light import Light
-from bilayer_core.model.records.parts import Strands
+from bilayer_core.model.records.parts import Drives, Strands
 from bilayer_core.model.section import outline
 from bilayer_core.model.shape_numbers import NUMBER
 from bilayer_core.model.sizes import sizes_of
 from bilayer_core.model.strands import Collected
 from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.diffusion_modes import responses
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.rod import Layer, Rod
 
@@ -36,7 +37,8 @@ def add_lit_elements(
     first_edge: int,
     axis: Array,
 ) -> Array:
-    """Add what a light reaches of a layer, and laws for it, one an edge that the law drives: their numbers.
+    """Add what a light reaches of a layer, and laws for it, one an edge that the law drives: their numbers for the mean
+    of the layer and for its gradient (−1 without), shape (n_driven, 2).
 
     Parameters
     ----------
@@ -47,14 +49,15 @@ def add_lit_elements(
     axis : Array
         Height of the strand over the path in the middle of each edge of the path [m].
     """
-    numbers = found.laws_of_elements(scene, law, len(edges))
+    (response,) = responses(rod, layer, law)
+    numbers = np.array([found.law(scene, law, response, alone=True) for _ in edges])
     slot = rod.layers.index(layer)
     _, thickness = outline(rod, edges + 0.5)
     own, alone = thickness[slot], thickness.sum(axis=0) == thickness[slot]
     outward = np.array([-1.0, 1.0])[slot] if len(rod.layers) == 2 else 1.0
     middle = 0.5 * outward * own if len(rod.layers) == 2 else 0.0 * own
     found.add(
-        lit_law=numbers,
+        lit_law=numbers[:, 0],
         lit_edge=first_edge + edges,
         lit_side=np.where(alone, 0.0, outward),
         lit_height=middle + np.where(alone, 0.0, 0.5 * outward * own) - axis[edges],
@@ -64,7 +67,7 @@ def add_lit_elements(
     return numbers
 
 
-def build_light(scene: SceneConfig, found: Collected, bodies: PlacedBodies, rods: Strands, law_channel: Array) -> Light:
+def build_light(scene: SceneConfig, found: Collected, bodies: PlacedBodies, rods: Strands, drives: Drives) -> Light:
     """Return the elements that lights shine on, and directions to the lights at the start; absent if no layer
     follows a light.
     """
@@ -79,9 +82,10 @@ def build_light(scene: SceneConfig, found: Collected, bodies: PlacedBodies, rods
     return Light.zeros(
         UNALLOCATED,
         law=law,
+        field=drives.law_field[law],
         edge=found.column("lit_edge", np.int64),
         **{name: found.column(f"lit_{name}") for name in ("side", "height", "half", "slenderness")},
-        source=np.array([number[channel] for channel in law_channel[law]], dtype=np.int64),
+        source=np.array([number[channel] for channel in drives.field_channel[drives.law_field[law]]], dtype=np.int64),
         direction=np.array([scene.stimuli[name].light.from_direction for name in lights]),
         casts=casts,
         edge_node=rods.edge_node,
@@ -126,13 +130,13 @@ def shine(light, end):
 
 
 def part_seen(light: Light, position: Array, director1: Array, body_position: Array, body_rotation: Array) -> Array:
-    """Return the part of its stimulus that each law sees of a robot at some positions and frames: 1 where that is no
-    light, shape (n_law,).
+    """Return the part of its stimulus that each field sees of a robot at some positions and frames: 1 where that is no
+    light, shape (n_field,).
     """
     light.node_position[:], light.director1[:] = position, director1
     light.body_position[:-1], light.body_rotation[:-1] = body_position, body_rotation
     shine(light, 0)
     seen = np.ones(len(light.seen))
     elements = zip(light.side, light.facing[:, 0], light.visible[:, 0], strict=True)
-    seen[light.law] = [brightness.py_func(*map(float, element)) for element in elements]
+    seen[light.field] = [brightness.py_func(*map(float, element)) for element in elements]
     return seen

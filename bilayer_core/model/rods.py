@@ -24,6 +24,7 @@ from bilayer_core.model.strands import (
     with_copies,
 )
 from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.diffusion_modes import responses
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.profile import means_between
 from bilayer_core.scene.rod import Layer, Rod, RodCopy
@@ -62,10 +63,10 @@ def _add_copy(found: Collected, scene: SceneConfig, copy: RodCopy, body_index: d
             closed=shape.closed,
             round=rod.radius is not None,
         )
-        _add_eigenstrain(found, scene, rod, slot, strand)
         time = scene.materials[layer.material].retardation_time
         elements = _elements(rod, layer, at_nodes, at_edges, shape, time)
         joints = add_strands(found, scene, rod, [strand], shape, elements, body_index)[0]
+        _add_eigenstrain(found, scene, rod, slot, strand, shape, joints)
         strands.append(_Bonded(first, strand.first_node, strand.first_edge, shape, elements, joints))
     found.rods.append([strand.span for strand in strands])
     found.path_height.append(0.0)
@@ -165,8 +166,16 @@ def _rest(rod: Rod, layer: Layer, shape: StrandShape) -> Array:
     return rest
 
 
-def _add_eigenstrain(found: Collected, scene: SceneConfig, rod: Rod, slot: int, strand: StrandArrays) -> None:
-    """Add the edges of a layer that follow its laws."""
+def _add_eigenstrain(
+    found: Collected,
+    scene: SceneConfig,
+    rod: Rod,
+    slot: int,
+    strand: StrandArrays,
+    shape: StrandShape,
+    joints: Array,
+) -> None:
+    """Add the edges of a layer that follow its laws, and the joints that follow the gradient of a field in it."""
     layer = rod.layers[slot]
     first_edge = strand.first_edge - strand.first_station
     for law in layer.eigenstrain:
@@ -174,12 +183,29 @@ def _add_eigenstrain(found: Collected, scene: SceneConfig, rod: Rod, slot: int, 
         if is_light(scene, law):
             _, thickness = outline(rod, np.arange(rod.stations - 1) + 0.5)
             axis = 0.0 * thickness[0] if len(rod.layers) == 1 else _OUTWARD[slot] * 0.5 * thickness[slot]
-            laws = add_lit_elements(found, scene, rod, layer, law, edges, first_edge, axis)
+            groups = [(add_lit_elements(found, scene, rod, layer, law, edges, first_edge, axis), weight)]
         else:
-            laws = np.full(len(edges), found.law(scene, law))
+            groups = [
+                (
+                    np.tile(found.law(scene, law, response), (len(edges), 1)),
+                    weight if response.along is None else weight * response.along[edges],
+                )
+                for response in responses(rod, layer, law)
+            ]
         driven = with_copies(rod, edges) if strand.closed else edges
-        laws, weight = (np.append(of, of[edges == 0])[: len(driven)] for of in (laws, weight))
-        found.add(driven_edge=first_edge + driven, driven_law=laws, driven_weight=weight)
+        for laws, weight in groups:
+            laws, weight = (np.concatenate([of, of[edges == 0]])[: len(driven)] for of in (laws, weight))
+            found.add(driven_edge=first_edge + driven, driven_law=laws[:, 0], driven_weight=weight)
+            if laws[0, 1] >= 0:
+                own = driven - strand.first_station
+                turned = -0.5 * weight * shape.lengths[own] / layer.thickness  # of a half edge
+                for at in (own, own + 1):
+                    held = joints[at] >= 0
+                    found.add(
+                        driven_joint=joints[at][held],
+                        driven_joint_law=laws[held, 1],
+                        driven_joint_weight=turned[held],
+                    )
 
 
 def _driven(rod: Rod, layer: Layer, law: Eigenstrain, strand: StrandArrays) -> tuple[Array, Array]:

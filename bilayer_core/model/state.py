@@ -13,6 +13,7 @@ from bilayer_core.model.fingerprint import FREE, difference
 from bilayer_core.model.lit_elements import light_of, part_seen
 from bilayer_core.model.model import Model
 from bilayer_core.model.override import no_overrides
+from bilayer_core.model.records.parts import Drives
 from bilayer_core.model.set_friction import none_given
 from bilayer_core.model.sizes import sizes_of
 from bilayer_core.model.start_motion import set_in_motion
@@ -71,7 +72,7 @@ class State:
     account: Array  # of energy; see `engine.energy_account`, shape (14,)
     law_force: Array  # −∂V/∂η of each eigenstrain law when the account was last written [J], shape (n_law,)
     light_rate: Array  # of m1·l and V of each lit element over the last step [1/s], shape (n_lit, 2)
-    transduction: Array  # filtered stimulus of each eigenstrain law, shape (n_law,)
+    transduction: Array  # stimulus that each mode of a material has reached, shape (n_mode,)
     conditions: Array  # number of all that a state may be taken into another scene for, shape (1,)
     seal: Array  # checksum of a flat state, 0 before it is one, shape (1,)
     override: Array  # what is set from outside of channels, then of loads (`model.override`), shape (n, 4)
@@ -201,12 +202,15 @@ def refuse_out_of_plane(model: Model, state: State) -> None:
 
 
 def _settled(model: Model, stimulus: Array) -> Array:
-    """Return the value that each law has at the start if channels have had theirs for long, shape (n_law,)."""
-    light, settled = light_of(model), stimulus[model.drives.law_channel]
-    if not light.exists:
-        return settled
-    bodies, frames = model.bodies, model.start_director1
-    return settled * part_seen(light, model.start_position, frames, bodies.start_position, bodies.start_rotation)
+    """Return the value that each mode has at the start if channels have had theirs for long, shape (n_mode,)."""
+    light, place = light_of(model), (model.start_position, model.start_director1)
+    seen = part_seen(light, *place, model.bodies.start_position, model.bodies.start_rotation) if light.exists else 1.0
+    return reached_at_rest(model.drives, stimulus, seen)
+
+
+def reached_at_rest(drives: Drives, stimulus: Array, seen: Array | float) -> Array:
+    """Return what each mode reaches of the stimuli of channels, of which fields see a part, shape (n_mode,)."""
+    return np.repeat(stimulus[drives.field_channel] * seen, np.diff(drives.field_first))
 
 
 def initial_state(

@@ -13,6 +13,7 @@ from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.imperfect_shapes import departure
 from bilayer_core.model.strand_arrays import StrandArrays
 from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.diffusion_modes import Response
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.pattern import Placement
 from bilayer_core.scene.rod import Layer, Rod
@@ -31,8 +32,10 @@ class Collected:
     path_height: list[float] = field(default_factory=list)
     """Of the path of each rod over its only strand [m]; 0 where two strands lie on either side of it."""
     columns: dict[str, list] = field(default_factory=dict)
-    laws: list[tuple[float, ...]] = field(default_factory=list)
-    """Channel, time constants rising and falling, gain, reference, saturation of each eigenstrain law."""
+    fields: list[tuple[int, tuple[tuple[float, float], ...]]] = field(default_factory=list)
+    """Channel, and time constants rising and falling of the modes, of all that follows a stimulus."""
+    laws: list[tuple[int, tuple[float, ...], float, float, float]] = field(default_factory=list)
+    """Field, weights of its modes, gain, reference, saturation of each eigenstrain law."""
     node_count: int = 0
     edge_count: int = 0
     joint_count: int = 0
@@ -48,22 +51,23 @@ class Collected:
             return np.zeros((0,) if width is None else (0, width), dtype)
         return np.concatenate(parts).astype(dtype, order="C", copy=False)
 
-    def law(self, scene: SceneConfig, law: Eigenstrain) -> int:
-        """Return the number of an eigenstrain law; equal laws share one."""
-        numbers = _numbers_of(scene, law)
-        if numbers not in self.laws:
-            self.laws.append(numbers)
-        return self.laws.index(numbers)
-
-    def laws_of_elements(self, scene: SceneConfig, law: Eigenstrain, count: int) -> Array:
-        """Return the numbers of laws of their own for so many elements of a layer, which light reaches differently."""
-        first = len(self.laws)
-        self.laws += [_numbers_of(scene, law)] * count
-        return first + np.arange(count)
-
-
-def _numbers_of(scene: SceneConfig, law: Eigenstrain) -> tuple[float, ...]:
-    return (list(scene.stimuli).index(law.stimulus), *law.lags, law.gain, law.reference, law.limit)
+    def law(self, scene: SceneConfig, law: Eigenstrain, response: Response, alone: bool = False) -> tuple[int, int]:
+        """Return the numbers of the laws for mean and gradient of a response, the latter −1 without one; equal laws
+        share one, unless it is for one element `alone`, which light reaches differently.
+        """
+        followed = list(scene.stimuli).index(law.stimulus), response.lags
+        laws = [(response.mean, law.gain, response.mean_reference, law.limit)]
+        if response.gradient:
+            laws.append((response.gradient, law.gain, response.gradient_reference, law.limit))
+        for number, (at, *others) in enumerate(self.laws if not alone else ()):
+            if self.fields[at] == followed and tuple(others) == laws[0]:
+                return number, number + 1 if response.gradient else -1
+        shared = response.gradient and not alone and followed in self.fields
+        field = self.fields.index(followed) if shared else len(self.fields)
+        if not shared:
+            self.fields.append(followed)
+        self.laws += [(field, *own) for own in laws]
+        return len(self.laws) - len(laws), len(self.laws) - 1 if response.gradient else -1
 
 
 @dataclass(frozen=True)

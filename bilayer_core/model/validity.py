@@ -8,12 +8,14 @@ from math import inf
 import numpy as np
 
 from bilayer_core.contact.near import SAG
+from bilayer_core.model.diffusion_times import diffusion_figures
 from bilayer_core.model.findings import Figure
 from bilayer_core.model.plate_strip import curved_stiffness, folds, swollen_curvature
 from bilayer_core.model.points_between import demand_of, spacing
 from bilayer_core.model.section import outline
 from bilayer_core.model.shape_numbers import shape_of
 from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.diffusion_modes import strain_at
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.profile import values_at
 from bilayer_core.scene.rod import Layer, Rod
@@ -40,6 +42,7 @@ def validity_figures(scene: SceneConfig) -> Iterator[Figure]:
         at_edges = edge_figures(scene, rod)
         thinnest[rod.name] = at_edges.thickness.min()
         yield from _of_section(rod, at_edges)
+        yield from diffusion_figures(scene, rod)
         if scene.contact is not None:
             yield from _of_points(scene, rod, at_edges)
     if scene.contact is not None:
@@ -198,7 +201,7 @@ def _eigenstrain_range(scene: SceneConfig, rod: Rod, layer: Layer, laws: tuple[E
     found = np.zeros((3, rod.stations - 1))
     for law in laws:
         channel = scene.stimuli[law.stimulus]
-        least, most = np.sort(law.strain_at(np.array([channel.minimum, channel.maximum])))
+        least, most = np.sort(strain_at(rod, layer, law, np.array([channel.minimum, channel.maximum])))
         driven = rod.covered_parts(np.arange(rod.stations - 1), layer, law) > 0.0
         found[:, driven] += np.array([[max(abs(least), abs(most))], [least], [most]])
     return found

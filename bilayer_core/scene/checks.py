@@ -7,11 +7,12 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from bilayer_core.scene.diffusion_modes import strain_at
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, repeated
 from bilayer_core.scene.limits import faults_of_size
 from bilayer_core.scene.load import Load, PointMass
-from bilayer_core.scene.rod import Rod
+from bilayer_core.scene.rod import Layer, Rod
 
 
 class SceneConfig(Protocol):
@@ -62,9 +63,14 @@ def _references(scene: SceneConfig) -> Iterator[Fault]:
                     yield (*where, "eigenstrain", place, "stimulus"), law.stimulus, demand
                 names = {variant.layers[index].eigenstrain[place].stimulus for variant in rod.variants}
                 lights = [name for name in sorted(names & scene.stimuli.keys()) if scene.stimuli[name].light]
-                if lights and min(law.lags) == 0.0:
+                if lights and min(law.lags) == 0.0 and rod.diffusion_of(layer, law) is None:
                     demand = f"must be a time [s] above 0, rising and falling: `{lights[0]}` is a light"
                     yield (*where, "eigenstrain", place, "time_constant"), law.time_constant, demand
+        for index, field in enumerate(rod.diffusion):
+            own = {variant.diffusion[index].stimulus for variant in rod.variants}
+            if field.along and any(scene.stimuli[name].light for name in own & scene.stimuli.keys()):
+                demand = "must be false where the stimulus is a light with a direction: each element sees its own"
+                yield ("rods", number, "diffusion", index, "along"), True, demand
         for name, channels in rod.pattern.stimuli.items() if rod.pattern else ():
             for copy, channel in enumerate(channels):
                 if channel not in scene.stimuli:
@@ -137,12 +143,12 @@ def _rest_length(scene: SceneConfig, rod: Rod, index: int) -> tuple[float, int, 
     acting = {tuple(k for k, (begin, end) in enumerate(spans) if begin <= at < end) for at in begins}
     worst, least = (), -1.0
     for places in sorted(acting):
-        strain = _least_strain(scene, [layer.eigenstrain[place] for place in places])
+        strain = _least_strain(scene, rod, layer, [layer.eigenstrain[place] for place in places])
         if strain <= least:
             worst, least = places, strain
     if not worst:
         return None
-    place = min(worst, key=lambda k: _least_strain(scene, [layer.eigenstrain[k]]))
+    place = min(worst, key=lambda k: _least_strain(scene, rod, layer, [layer.eigenstrain[k]]))
     law = layer.eigenstrain[place]
     channel = scene.stimuli[law.stimulus]
     others = ", with the laws that act there too," if len(worst) > 1 else ""
@@ -158,8 +164,8 @@ SAMPLES = 257
 """Values of a channel at which laws that follow it in step are added up; the two ends are among them."""
 
 
-def _least_strain(scene: SceneConfig, laws: list[Eigenstrain]) -> float:
-    """Return the least sum of the eigenstrains of some laws that the ranges of their channels allow.
+def _least_strain(scene: SceneConfig, rod: Rod, layer: Layer, laws: list[Eigenstrain]) -> float:
+    """Return the least sum of the eigenstrains of some laws of a layer that the ranges of their channels allow.
 
     Laws of one channel with the same lags have reached the same stimulus at any time. Others may be anywhere in their
     ranges independently, as lags never leave the range of what they follow.
@@ -171,7 +177,7 @@ def _least_strain(scene: SceneConfig, laws: list[Eigenstrain]) -> float:
     for (name, _), group in together.items():
         channel = scene.stimuli[name]
         values = np.linspace(channel.minimum, channel.maximum, SAMPLES)
-        total += float(sum(law.strain_at(values) for law in group).min())
+        total += float(sum(strain_at(rod, layer, law, values) for law in group).min())
     return total
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, field_serializer, model_serializer
 
 from bilayer_core.scene.close_paths import crossings
+from bilayer_core.scene.diffusion import Diffusion
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, repeated
 from bilayer_core.scene.friction import Coefficients
@@ -35,6 +36,13 @@ Eigenstrains = Annotated[
     BeforeValidator(
         lambda laws: [] if laws is None else [laws] if isinstance(laws, dict) else laws,
         json_schema_input_type=Eigenstrain | list[Eigenstrain] | None,
+    ),
+]
+Diffusions = Annotated[
+    list[Diffusion],
+    BeforeValidator(
+        lambda fields: [] if fields is None else [fields] if isinstance(fields, dict) else fields,
+        json_schema_input_type=Diffusion | list[Diffusion] | None,
     ),
 ]
 
@@ -101,6 +109,8 @@ class Rod(Part):
     """Cross-sections along the path, both ends included; the last one of a closed path is the first again."""
     layers: list[Layer] = Field(min_length=1, max_length=2)
     """Bottom first."""
+    diffusion: Diffusions = []
+    """Of moisture or heat through the layers; one field or several. Layers without one follow with their lags."""
     torsion: Literal["laminate", "layers"] = "laminate"
     """Torsional stiffness: of the bonded section, or the sum of the layers' own."""
     friction_axis: Literal["path", "normal", "across"] = "path"
@@ -173,6 +183,10 @@ class Rod(Part):
         def made() -> Rod:
             if channels or gain != 1.0:
                 own["layers"] = [layer.driven_by(channels, gain) for layer in self.layers]
+                own["diffusion"] = [
+                    field.model_copy(update={"stimulus": channels.get(field.stimulus, field.stimulus)})
+                    for field in self.diffusion
+                ]
             return self.model_copy(update=own)
 
         alike = own.get("clamp_start"), own.get("clamp_end"), tuple(channels.values()), gain
@@ -189,6 +203,16 @@ class Rod(Part):
             laws = tuple(tuple(layer.eigenstrain) for layer in rod.layers)
             found.setdefault((rod.clamp_start, rod.clamp_end, laws), rod)
         return tuple(found.values())
+
+    def diffusion_of(self, layer: Layer, law: Eigenstrain) -> Diffusion | None:
+        """Return the field that a law of a layer follows; None if it follows its stimulus with a lag."""
+        fields = (f for f in self.diffusion if f.stimulus == law.stimulus and layer.name in f.diffusivity)
+        return next(fields, None)
+
+    @field_serializer("diffusion")
+    def _fields_as_written(self, fields: list[Diffusion]) -> Any:
+        """Return a single field without its list, as scenes state it."""
+        return fields if len(fields) > 1 else fields[0] if fields else None
 
     def covered_stations(self, layer: Layer) -> tuple[int, int]:
         """Return the first and last station of `layer`, those nearest to its interval."""
@@ -300,6 +324,7 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
             "one layer must cover the whole path; layers that each cover a part of it are two rods, joined by a body"
         )
         faults.append((("layers",), [layer.interval for layer in rod.layers], demand))
+    faults += _faults_of_diffusion(rod)
     faults += _faults_of_copies(rod) if rod.pattern is not None else ()
     for key in ("velocity", "angular_velocity"):
         if getattr(rod, key) is not None and any(variant.clamp_start or variant.clamp_end for variant in rod.variants):
@@ -336,6 +361,55 @@ def _sections(rod: Rod) -> Iterator[Fault]:
             faults.append((("inner_radius",), float(inner[worst]), demand))
     yield from faults
     vars(rod).update(width=diameter, layers=[rod.layers[0].model_copy(update={"thickness": diameter})])
+
+
+LAGS = ("time_constant", "time_constant_rising", "time_constant_falling", "saturation")
+"""Keys of a law that a diffusion replaces, or that need the whole profile of the field."""
+
+
+def _faults_of_diffusion(rod: Rod) -> Iterator[Fault]:
+    """Yield the faults of fields that do not fit the layers of a rod."""
+    layers = {layer.name: layer for layer in rod.layers}
+    yield from repeated([(("diffusion", i, "stimulus"), f.stimulus) for i, f in enumerate(rod.diffusion)], "diffusion")
+    for index, field in enumerate(rod.diffusion):
+        where: Location = ("diffusion", index)
+        if rod.radius is not None:
+            yield where, field.stimulus, "must be left out: a round rod has no faces through its thickness"
+            continue
+        unknown = [name for name in field.diffusivity if name not in layers]
+        for name in unknown:
+            yield (*where, "diffusivity", name), name, one_of("layers of the rod", name, layers)
+        if unknown:
+            continue
+        for key, face in field.faces:
+            outer = rod.layers[0 if key == "bottom" else -1].name
+            if outer not in field.diffusivity:
+                demand = f"must be left out: its layer, {outer}, has no diffusivity"
+                yield (*where, key), face.sees, demand
+        for name in field.diffusivity:
+            if isinstance(layers[name].thickness, Profile):
+                yield (*where, "diffusivity", name), field.diffusivity[name], "must be of a layer of one thickness"
+            elif layers[name].interval is not None and (len(field.diffusivity) > 1 or field.along):
+                demand = "must be of a layer over the whole path, where the field goes on to another layer or along it"
+                yield (*where, "diffusivity", name), field.diffusivity[name], demand
+        if field.along and rod.closed:
+            yield (*where, "along"), True, "must be false on a closed path"
+        if field.interval is not None and not field.interval[0] < field.interval[1] <= rod.path.length * (1 + ROUNDING):
+            demand = f"must be two increasing lengths [m] along the path, from 0 to {rod.path.length:g}"
+            yield (*where, "interval"), field.interval, demand
+        followed = False
+        for slot, layer in enumerate(rod.layers):
+            for number, law in enumerate(layer.eigenstrain):
+                if rod.diffusion_of(layer, law) is not field:
+                    continue
+                followed = True
+                for key in LAGS:
+                    if getattr(law, key) is not None:
+                        demand = "must be left out: the layer follows the rod's `diffusion`"
+                        yield ("layers", slot, "eigenstrain", number, key), getattr(law, key), demand
+        if not followed:
+            demand = f"must be that of a law of a layer in `diffusivity` ({', '.join(field.diffusivity)})"
+            yield (*where, "stimulus"), field.stimulus, demand
 
 
 LEAST_CLOSED = 5

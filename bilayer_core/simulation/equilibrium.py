@@ -27,7 +27,7 @@ from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.model.lit_elements import light_of, part_seen
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.status import CROSSED, MAX_ITERATIONS
-from bilayer_core.model.state import NOT_KNOWN, State
+from bilayer_core.model.state import NOT_KNOWN, State, reached_at_rest
 from bilayer_core.simulation.crossing_remedy import crossing
 from bilayer_core.simulation.stepper import Stepper
 
@@ -181,11 +181,10 @@ class _Search:
         """Write the rest strains and the loads of now, and the light on the present shape, to a stepper."""
         state, model = self.state, self.stepper.model
         if len(state.transduction):
-            settled = self.stepper.surroundings.stimulus_at(state, self.time, self.ended)[model.drives.law_channel]
-            if self.light.exists:
-                place = state.position, state.director1, state.body_position, state.body_rotation
-                settled = settled * part_seen(self.light, *place)
-            state.transduction[:] = settled
+            stimulus = self.stepper.surroundings.stimulus_at(state, self.time, self.ended)
+            place = state.position, state.director1, state.body_position, state.body_rotation
+            seen = part_seen(self.light, *place) if self.light.exists else 1.0
+            state.transduction[:] = reached_at_rest(model.drives, stimulus, seen)
         stepper.engine.set_drive(state, self.stepper.surroundings.load_factor(self.state, self.ended))
 
     def run(self) -> StaticReport:

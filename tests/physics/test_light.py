@@ -151,8 +151,8 @@ def test_a_scene_without_light_has_nothing_of_it():
     content = lit_strip(0.0, stations=6)
     del content["stimuli"]["sun"]["light"]
     model = build_model(load_scene(content), "laminate")
-    assert not light_of(model).exists and len(model.drives.law_channel) == 1
-    assert len(build_model(load_scene(lit_strip(0.0, stations=6)), "laminate").drives.law_channel) == 5
+    assert not light_of(model).exists and len(model.drives.law_gain) == 1
+    assert len(build_model(load_scene(lit_strip(0.0, stations=6)), "laminate").drives.law_gain) == 5
 
 
 def test_copies_that_are_mirror_images_bend_as_mirror_images():

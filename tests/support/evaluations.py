@@ -114,7 +114,7 @@ class Problem:
             for b in range(len(origin.rotation)):
                 origin.rotation[b] = rotation_matrix(1e3 * origin_noise * rng.standard_normal(3)) @ origin.rotation[b]
             turned = 1e3 * origin_noise * rng.standard_normal(model.rods.edge_count)
-        strains = evaluator.rest_strains_of(np.full(len(model.drives.law_gain), 0.7))
+        strains = evaluator.rest_strains_of(np.full(len(model.drives.mode_rising), 0.7))
         then = state.copy()
         then.time[0] = 0.03
         load_factor = Surroundings(model).load_factor(then)

@@ -9,7 +9,8 @@ from bilayer_core.jit.record import Flags, Indices, Matrix, Stack, Vector, recor
 class Light:
     """Elements of layers on which light shines; see `contact.light`. Absent where no layer follows a light."""
 
-    law: Indices  # the law of each element: it has one of its own, shape (n_lit,)
+    law: Indices  # the law of each element, for the mean of its layer: it has one of its own, shape (n_lit,)
+    field: Indices  # that it follows, likewise
     edge: Indices  # shape (n_lit,)
     side: Vector  # ±1: its outer face is towards ± m1; 0: it has two, shape (n_lit,)
     height: Vector  # of its outer face over the strand along m1, or of its middle if it has two [m], shape (n_lit,)
@@ -38,4 +39,4 @@ class Light:
     body_rotation: Stack = ("body+world", 3, 3)
     facing: Matrix = ("lit", 2)  # m1·l at the start of a step and at its end
     visible: Matrix = ("lit", 2)  # V likewise
-    seen: Matrix = ("law", 2)  # part of its stimulus that each law sees at the start of a step and at a time in it
+    seen: Matrix = ("field", 2)  # part of its stimulus that each field sees at the start of a step and a time in it

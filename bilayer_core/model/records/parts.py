@@ -55,9 +55,14 @@ class Drives:
     driven_joint: Indices  # joints whose κ̄₁ follows a law, once for each law, shape (n_driven_joint,)
     driven_joint_law: Indices  # likewise
     driven_joint_weight: Vector  # κ̄₁ per eigenstrain of the law [rad], likewise
-    law_channel: Indices  # stimulus channel of each law, shape (n_law,)
-    law_rising: Vector  # time constant for a rising stimulus [s], shape (n_law,)
-    law_falling: Vector  # and for a falling one
+    field_channel: Indices  # stimulus channel of each field: what materials reach of it, by its modes, shape (n_field,)
+    field_first: Indices  # first mode of each field, last the number of all, shape (n_field + 1,)
+    field_slowest: Indices  # its mode with the longest time constant, shape (n_field,)
+    mode_rising: Vector  # time constant of each mode for a rising stimulus [s], shape (n_mode,)
+    mode_falling: Vector  # and for a falling one
+    law_field: Indices  # the field that each law follows, shape (n_law,)
+    law_first: Indices  # where its weights begin, last the number of all, shape (n_law + 1,)
+    law_weight: Vector  # of the modes of its field in what it follows
     law_gain: Vector  # eigenstrain per unit of stimulus near the reference, shape (n_law,)
     law_reference: Vector  # stimulus without eigenstrain, in its unit, shape (n_law,)
     law_saturation: Vector  # largest magnitude of the eigenstrain, or infinite, shape (n_law,)

@@ -189,7 +189,7 @@ class Work:
     moved: Vector = (1,)  # largest displacement in a round of statics [m]
     start_angle: Vector = ("edge",)  # of edges, from the start of the step to that of the stage [rad]
     rotation: Stack = ("body", 3, 3)  # scratch
-    transduction: Vector = ("law",)  # at a stage
+    transduction: Vector = ("mode",)  # at a stage
     strain: Vector = ("law",)  # of laws at a stage
     start_strain: Vector = ("law",)  # and at the start of the step, after jumps of stimuli
     start_force: Vector = ("law",)  # −∂V/∂η of laws there [J]

@@ -10,6 +10,7 @@ from bilayer_core.verification.validate import (
     beams,
     bending,
     contacts,
+    diffusion_series,
     ends,
     fluid,
     friction,
@@ -65,6 +66,7 @@ FAMILIES = (
     viscosity,
     fluid,
     light,
+    diffusion_series,
 )
 CASES = tuple(case for family in FAMILIES for case in family.CASES)
 

@@ -1,0 +1,76 @@
+"""Diffusion of moisture or heat through the layers of a rod."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Literal
+
+from bilayer_core.scene.faults import Fault
+from bilayer_core.scene.part import Name, Part
+from bilayer_core.scene.units import NonNegativeLength, PlainNumber, PositiveLength, PositiveNumber, real
+
+PositiveDiffusivity = Annotated[float, *real("a diffusivity", "m^2/s", "2e-11 m^2/s", above=0.0)]
+PositiveExchange = Annotated[float, *real("an exchange coefficient", "m/s", "1e-6 m/s", above=0.0)]
+PositiveSourceRate = Annotated[float, *real("a rate", "1/s", "2", above=0.0)]
+
+
+class Face(Part):
+    """A face of a rod through which the field enters and leaves its outer layer."""
+
+    sees: Literal["stimulus", "ambient"] = "stimulus"
+    """What is outside: the stimulus, or `ambient`."""
+    exchange: PositiveExchange | None = None
+    """h of the flux h × (value outside − value at the face); without it the face takes the value outside at once."""
+
+
+class Source(Part):
+    """Light that a layer absorbs, or current that heats it: a source in the layer."""
+
+    layer: Name
+    """One with a diffusivity."""
+    rate: PositiveSourceRate
+    """How fast the stimulus 1 would raise the layer's mean value if nothing left it."""
+    depth: PositiveLength | None = None
+    """Over which the source fades e-fold, from the layer's outer face inwards; by default it is uniform."""
+
+
+class Diffusion(Part):
+    """Diffusion of a field through the thickness of a rod. It takes the place of the lag in the layers it names."""
+
+    stimulus: str
+    """The channel that drives it; laws of the named layers with this stimulus follow the field."""
+    diffusivity: dict[Name, PositiveDiffusivity]
+    """Of layers by their names; the field does not enter a layer that is not named."""
+    bottom: Face | None = None
+    """Outer face of the first layer; by default nothing passes it."""
+    top: Face | None = None
+    """Outer face of the last layer."""
+    source: Source | None = None
+    """In a layer; by default there is none."""
+    partition: PositiveNumber = 1.0
+    """Content of the second layer over that of the first where both are in equilibrium."""
+    ambient: PlainNumber = 0.0
+    """Outside faces that do not see the stimulus, in its unit."""
+    along: bool = False
+    """Whether the field also spreads along the rod, whose ends are closed."""
+    interval: tuple[NonNegativeLength, PositiveLength] | None = None
+    """With `along`: where the stimulus acts, from and to along the path; faces elsewhere see `ambient`."""
+
+    @property
+    def faces(self) -> tuple[tuple[str, Face], ...]:
+        """Open faces by their keys."""
+        return tuple((key, face) for key, face in (("bottom", self.bottom), ("top", self.top)) if face is not None)
+
+    def _faults(self) -> Iterator[Fault]:
+        if not self.diffusivity:
+            yield ("diffusivity",), {}, "must name a layer or two"
+        if self.source is not None and self.source.layer not in self.diffusivity:
+            yield ("source", "layer"), self.source.layer, f"must be one of {', '.join(self.diffusivity)}"
+        if not self.faces:
+            yield ("top",), None, "must be given, or `bottom`: nothing passes a closed face"
+        elif self.source is None and not any(face.sees == "stimulus" for _, face in self.faces):
+            yield (self.faces[0][0], "sees"), "ambient", "must be stimulus on a face, or `source` be given"
+        if self.interval is not None and not self.along:
+            yield ("interval",), self.interval, "must be left out where `along` is false: laws have an `interval`"
+        if len(self.diffusivity) < 2 and self.partition != 1.0:
+            yield ("partition",), self.partition, "must be left out: the field is in one layer only"
