@@ -38,6 +38,7 @@ from bilayer_core.engine.step_ends import (
     write_shape,
     write_twist,
 )
+from bilayer_core.engine.varied_diffusion import diffuse
 from bilayer_core.jit import kernel, piece, record_at
 from bilayer_core.kinematics.copying import copy
 from bilayer_core.model.records.problem import Problem
@@ -95,6 +96,9 @@ def drive_stage(p, state, inputs, n, work):
         first, last = inputs.first[channel], inputs.stimulus[n, channel]
         if p.light.exists:
             first, last = first * p.light.seen[f, 0], last * p.light.seen[f, 1]
+        if p.varied_fields.exists and p.varied_fields.number[f] >= 0:
+            diffuse(p.varied_fields, drives, f, state.transduction, first, last, inputs.elapsed[n], transduction)
+            continue
         for m in range(drives.field_first[f], drives.field_first[f + 1]):
             lags = drives.mode_rising[m], drives.mode_falling[m]
             transduction[m] = lagged(state.transduction[m], first, last, lags[0], lags[1], inputs.elapsed[n])

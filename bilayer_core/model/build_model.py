@@ -10,6 +10,7 @@ from bilayer_core.jit import UNALLOCATED
 from bilayer_core.kinematics.frame_strains import cross
 from bilayer_core.model.bodies import build_bodies
 from bilayer_core.model.contact_points import build_contact
+from bilayer_core.model.field_points import build_varied_fields
 from bilayer_core.model.force_list import active_forces
 from bilayer_core.model.immersed import build_fluid
 from bilayer_core.model.impacts import stiffness_for_impacts
@@ -81,6 +82,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         rods=rods,
         viscosity=_viscosity(found) if "viscosity" in forces else Viscosity.absent(),
         drives=drives,
+        varied_fields=build_varied_fields(scene, found, drives),
         light=build_light(scene, found, placed, rods, drives),
         plane=Plane.absent() if plane is None else _plane(plane, found, placed, rods),
         off_axis=OffAxis.absent() if bonds.exists else _off_axis(found, rods, strain_coupling),
@@ -157,7 +159,7 @@ def _viscosity(found: Collected) -> Viscosity:
 
 
 def _drives(found: Collected) -> Drives:
-    lags = [np.array(of, dtype=float) for _, of in found.fields]
+    lags = [np.array(of, dtype=float) for _, of, _ in found.fields]
     first = np.cumsum([0, *map(len, lags)])
     rising, falling = np.concatenate([np.zeros((0, 2)), *lags]).T.copy()
     weights = [weight for _, weight, *_ in found.laws]
@@ -169,7 +171,7 @@ def _drives(found: Collected) -> Drives:
             f"driven_{name}": found.column(f"driven_{name}", np.int64) for name in ("edge", "law", "joint", "joint_law")
         },
         **{f"driven_{name}": found.column(f"driven_{name}") for name in ("weight", "joint_weight")},
-        field_channel=np.array([channel for channel, _ in found.fields], dtype=np.int64),
+        field_channel=np.array([channel for channel, *_ in found.fields], dtype=np.int64),
         field_first=first.astype(np.int64),
         field_slowest=first[:-1] + np.array([of.max(axis=1).argmax() for of in lags], dtype=np.int64),
         mode_rising=rising,

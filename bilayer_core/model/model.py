@@ -27,6 +27,7 @@ from bilayer_core.model.records.parts import (
     Strands,
     Viscosity,
 )
+from bilayer_core.model.records.varied_fields import VariedFields
 from bilayer_core.model.shape_numbers import Shape
 from bilayer_core.model.strand_arrays import StrandArrays
 from bilayer_core.model.unknown_order import Layout, ReadOnlyArrays
@@ -68,6 +69,7 @@ class Model(ReadOnlyArrays):
     rods: Strands
     viscosity: Viscosity
     drives: Drives
+    varied_fields: VariedFields
     light: Light
     plane: Plane  # absent in three dimensions
     off_axis: OffAxis

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from bilayer_core.model.force_list import on_nodes
 from bilayer_core.model.force_slots import NAMES
 from bilayer_core.model.model import Model
@@ -54,6 +56,8 @@ def sizes_of(model: Model) -> dict[str, int]:
         "law": len(model.drives.law_gain),
         "mode": len(model.drives.mode_rising),
         "field": len(model.drives.field_channel),
+        "varied mode": int(np.diff(model.drives.field_first).max(initial=0)) if model.varied_fields.exists else 0,
+        "level": 3 if model.varied_fields.exists else 0,
         "lit": len(model.light.law),
         "load": len(scene.loads),
         "wet": model.node_count + model.kept_directors if in_fluid else 0,

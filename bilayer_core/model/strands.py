@@ -13,7 +13,7 @@ from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.imperfect_shapes import departure
 from bilayer_core.model.strand_arrays import StrandArrays
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.scene.diffusion_modes import Response
+from bilayer_core.scene.diffusion_modes import Response, VariedModes
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.pattern import Placement
 from bilayer_core.scene.rod import Layer, Rod
@@ -32,8 +32,8 @@ class Collected:
     path_height: list[float] = field(default_factory=list)
     """Of the path of each rod over its only strand [m]; 0 where two strands lie on either side of it."""
     columns: dict[str, list] = field(default_factory=dict)
-    fields: list[tuple[int, tuple[tuple[float, float], ...]]] = field(default_factory=list)
-    """Channel, and time constants rising and falling of the modes, of all that follows a stimulus."""
+    fields: list[tuple[int, tuple[tuple[float, float], ...], VariedModes | None]] = field(default_factory=list)
+    """Channel, time constants rising and falling of the modes, and what varies, of all that follows a stimulus."""
     laws: list[tuple[int, tuple[float, ...], float, float, float]] = field(default_factory=list)
     """Field, weights of its modes, gain, reference, saturation of each eigenstrain law."""
     node_count: int = 0
@@ -55,7 +55,7 @@ class Collected:
         """Return the numbers of the laws for mean and gradient of a response, the latter −1 without one; equal laws
         share one, unless it is for one element `alone`, which light reaches differently.
         """
-        followed = list(scene.stimuli).index(law.stimulus), response.lags
+        followed = list(scene.stimuli).index(law.stimulus), response.lags, response.varied
         laws = [(response.mean, law.gain, response.mean_reference, law.limit)]
         if response.gradient:
             laws.append((response.gradient, law.gain, response.gradient_reference, law.limit))

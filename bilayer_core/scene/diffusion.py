@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, TypeAdapter
 
 from bilayer_core.scene.faults import Fault
 from bilayer_core.scene.part import Name, Part
@@ -12,6 +14,43 @@ from bilayer_core.scene.units import NonNegativeLength, PlainNumber, PositiveLen
 PositiveDiffusivity = Annotated[float, *real("a diffusivity", "m^2/s", "2e-11 m^2/s", above=0.0)]
 PositiveExchange = Annotated[float, *real("an exchange coefficient", "m/s", "1e-6 m/s", above=0.0)]
 PositiveSourceRate = Annotated[float, *real("a rate", "1/s", "2", above=0.0)]
+
+
+class DiffusivityCurve(Part):
+    """A diffusivity that depends on the field: linear between values of the field, constant beyond them."""
+
+    at: list[PlainNumber] = Field(min_length=1)
+    """Values of the field in the unit of the stimulus, increasing."""
+    value: list[PositiveDiffusivity] = Field(min_length=1)
+    """Diffusivity there, as many."""
+
+    def _faults(self) -> Iterator[Fault]:
+        for index, (before, after) in enumerate(zip(self.at, self.at[1:], strict=False), start=1):
+            if after <= before:
+                yield ("at", index), after, f"must be above the value before it ({before:g})"
+        if len(self.at) != len(self.value):
+            yield ("value",), f"{len(self.value)} entries", f"must be as many as `at`, {len(self.at)}"
+
+
+class _NumberOrCurve:
+    """Validator of a diffusivity; a curve's faults stand at its own keys."""
+
+    def __init__(self) -> None:
+        self._number, self._curve = TypeAdapter(PositiveDiffusivity), TypeAdapter(DiffusivityCurve)
+
+    def describe(self) -> str:
+        """Return a description of the allowed values."""
+        return "a diffusivity [m^2/s] above 0, such as 2e-11 m^2/s, or a curve {at: [...], value: [...]} over the field"
+
+    def __call__(self, value: Any) -> Any:
+        """Return the number or the curve, in SI units."""
+        return (self._curve if isinstance(value, dict | DiffusivityCurve) else self._number).validate_python(value)
+
+
+Diffusivity = Annotated[
+    float | DiffusivityCurve,
+    BeforeValidator(_NumberOrCurve(), json_schema_input_type=PositiveDiffusivity | DiffusivityCurve),
+]
 
 
 class Face(Part):
@@ -39,8 +78,8 @@ class Diffusion(Part):
 
     stimulus: str
     """The channel that drives it; laws of the named layers with this stimulus follow the field."""
-    diffusivity: dict[Name, PositiveDiffusivity]
-    """Of layers by their names; the field does not enter a layer that is not named."""
+    diffusivity: dict[Name, Diffusivity]
+    """Of layers by their names; the field does not enter a layer that is not named. It may depend on the field."""
     bottom: Face | None = None
     """Outer face of the first layer; by default nothing passes it."""
     top: Face | None = None
@@ -55,6 +94,11 @@ class Diffusion(Part):
     """Whether the field also spreads along the rod, whose ends are closed."""
     interval: tuple[NonNegativeLength, PositiveLength] | None = None
     """With `along`: where the stimulus acts, from and to along the path; faces elsewhere see `ambient`."""
+
+    @property
+    def varies(self) -> bool:
+        """True if a diffusivity depends on the field."""
+        return any(isinstance(value, DiffusivityCurve) for value in self.diffusivity.values())
 
     @property
     def faces(self) -> tuple[tuple[str, Face], ...]:
@@ -72,5 +116,14 @@ class Diffusion(Part):
             yield (self.faces[0][0], "sees"), "ambient", "must be stimulus on a face, or `source` be given"
         if self.interval is not None and not self.along:
             yield ("interval",), self.interval, "must be left out where `along` is false: laws have an `interval`"
+        if self.varies:
+            needs = "where a diffusivity depends on the field: only a uniform field is then known to be in equilibrium"
+            if self.source is not None:
+                yield ("source",), self.source.layer, f"must be left out {needs}"
+            for key, face in self.faces:
+                if face.sees != "stimulus":
+                    yield (key, "sees"), face.sees, f"must be stimulus {needs}"
+            if self.along:
+                yield ("along",), True, "must be false where a diffusivity depends on the field"
         if len(self.diffusivity) < 2 and self.partition != 1.0:
             yield ("partition",), self.partition, "must be left out: the field is in one layer only"

@@ -6,7 +6,7 @@ source of the stimulus u, and with faces that exchange h S_l (u − a),
     S_l ∂a/∂t = ∂/∂z(S_l D_l ∂a/∂z) + S_l r g(z) u,    a and S_l D_l ∂a/∂z continuous at the interface
 
 or a = u at a face. Only the ratio of both S counts, the partition coefficient. Tested with polynomials of degree
-`DEGREE` in each layer, on all of which the integrals are exact, this is M a' + K a = b u with symmetric M and K. The
+`DEGREE` in each layer, for which the integrals are exact, this is M a' + K a = b u with symmetric M and K. The
 steady state f solves K f = b, with f = 1 at faces where a = u. With the eigenvectors K v = λ M v, vᵀM v = 1, and
 γ = vᵀ M f,
 
@@ -23,6 +23,9 @@ A layer takes the mean of the field, and its gradient across the layer: with ζ 
 so that the eigenstrain g a bends the layer by itself to the curvature −g G/h towards its normal. What is left of the
 profile has neither force nor moment.
 
+Where D depends on a, these are the modes for a diffusivity in the middle of its range, and coordinates for the field
+that it has (`engine.varied_diffusion`); all else stays.
+
 Along a rod of n edges, whose ends are closed, cosines cos(π k (e + ½)/n) of the edges e are eigenvectors of the second
 difference: each k has its own K + q_k Σ D_l M_l, q_k = (2 − 2 cos(π k/n))/Δs², and its own modes.
 """
@@ -31,19 +34,53 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.polynomial import legendre
 
-from bilayer_core.scene.diffusion import Diffusion
+from bilayer_core.scene.diffusion import Diffusion, DiffusivityCurve
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.rod import Layer, Rod
 
 Array = np.ndarray
-DEGREE = 11
-"""Of polynomials in each layer: mean and gradient are within 1e-4 of the series from D t/h² = 0.003 on."""
+DEGREE, DEGREE_OF_VARIED = 11, 19
+"""Of polynomials in each layer: mean and gradient are within 1e-4 of the series from D t/h² = 0.003 on. Where the
+diffusivity depends on the field, fronts are steeper.
+"""
+GAUSS_POINTS = 24
+"""In each layer whose diffusivity varies."""
 NEGLIGIBLE = 1e-13
 """Weight of a mode, of the sum of all, that is rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class VariedModes:
+    """Modes of a field whose diffusivity depends on it, at Gauss points through its layers.
+
+    Attributes
+    ----------
+    amplitude : Array
+        γ, shape (n_mode,).
+    value, slope : Array
+        v and ∂v/∂z [1/m], shape (n_point, n_mode).
+    weight : Array
+        S dz of points [m], shape (n_point,).
+    exchange : Array
+        Σ h S v vᵀ of faces, shape (n_mode, n_mode).
+    curve : Array
+        The layer of each point, shape (n_point,).
+    curves : list of tuple of Array
+        Values of the field, and diffusivities there [m²/s], of each layer.
+    """
+
+    amplitude: Array
+    value: Array
+    slope: Array
+    weight: Array
+    exchange: Array
+    curve: Array
+    curves: list[tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -61,6 +98,8 @@ class Response:
         Values of both, in the unit of the stimulus, at which there is no eigenstrain.
     along : Array or None
         Multiple of both on each edge of the path, shape (n_edge,); None for 1.
+    varied : VariedModes or None
+        None where no diffusivity depends on the field.
     """
 
     lags: tuple[tuple[float, float], ...]
@@ -69,6 +108,7 @@ class Response:
     gradient: tuple[float, ...] = ()
     gradient_reference: float = 0.0
     along: Array | None = None
+    varied: VariedModes | None = None
 
 
 def responses(rod: Rod, layer: Layer, law: Eigenstrain) -> list[Response]:
@@ -107,6 +147,7 @@ def _response(part: FieldPart, layer: Layer, law: Eigenstrain) -> Response:
         gradient=tuple(gradient.tolist()),
         gradient_reference=-gradient_offset,
         along=part.along,
+        varied=part.modes.varied,
     )
 
 
@@ -173,20 +214,22 @@ class FieldModes:
     def __init__(self, rod: Rod, field: Diffusion, wave: float = 0.0):
         layers = [layer for layer in rod.layers if layer.name in field.diffusivity]
         self.names, self.ambient = tuple(layer.name for layer in layers), field.ambient
-        points = DEGREE * len(layers) + 1
+        self.degree = degree = DEGREE_OF_VARIED if field.varies else DEGREE
+        own_points, own_mass, own_stiffness = _element(degree)
+        points = degree * len(layers) + 1
         mass, stiffness = np.zeros((points, points)), np.zeros((points, points))
         seen, other, lit = np.zeros(points), np.zeros(points), np.zeros(points)
         means, gradients = np.zeros((len(layers), points)), np.zeros((len(layers), points))
         for slot, layer in enumerate(layers):
-            own = slice(DEGREE * slot, DEGREE * (slot + 1) + 1)
-            content, diffusivity = field.partition**slot, field.diffusivity[layer.name]
-            part = 0.5 * layer.thickness * content * _MASS
+            own = slice(degree * slot, degree * (slot + 1) + 1)
+            content, diffusivity = field.partition**slot, float(np.mean(_curve(field.diffusivity[layer.name])[1]))
+            part = 0.5 * layer.thickness * content * own_mass
             mass[own, own] += part
-            stiffness[own, own] += 2.0 / layer.thickness * content * diffusivity * _STIFFNESS
+            stiffness[own, own] += 2.0 / layer.thickness * content * diffusivity * own_stiffness
             stiffness[own, own] += wave * diffusivity * part
-            means[slot, own], gradients[slot, own] = 0.5 * _MASS.sum(axis=1), 1.5 * _MASS @ _POINTS
+            means[slot, own], gradients[slot, own] = 0.5 * own_mass.sum(axis=1), 1.5 * own_mass @ own_points
             if field.source is not None and field.source.layer == layer.name:
-                fades = _fading(rod, layer, field.source.depth)
+                fades = _fading(rod, layer, field.source.depth, degree)
                 lit[own] += 0.5 * layer.thickness * content * field.source.rate * fades
         given = np.zeros(points, dtype=bool)
         for key, face in field.faces:
@@ -208,6 +251,33 @@ class FieldModes:
         acting = np.abs(self.amplitude) > NEGLIGIBLE * np.abs(self.amplitude).max()
         self.vectors, self.times, self.amplitude = self.vectors[:, acting], self.times[acting], self.amplitude[acting]
         self.functionals = means, gradients
+        self.varied = self._varied(layers, field) if field.varies else None
+
+    def _varied(self, layers: list[Layer], field: Diffusion) -> VariedModes:
+        """Return the modes at Gauss points."""
+        degree = self.degree
+        modes = np.zeros((degree * len(layers) + 1, len(self.times)))
+        modes[self.free] = self.vectors
+        zeta, weight = legendre.leggauss(GAUSS_POINTS)
+        coefficients = np.linalg.inv(legendre.legvander(_element(degree)[0], degree))
+        shapes = legendre.legvander(zeta, degree) @ coefficients
+        slopes = legendre.legvander(zeta, degree - 1) @ legendre.legder(coefficients)
+        own = [modes[degree * slot : degree * (slot + 1) + 1] for slot in range(len(layers))]
+        exchange = np.zeros((len(self.times), len(self.times)))
+        for key, face in field.faces:
+            if face.exchange is not None:
+                at, content = (0, 1.0) if key == "bottom" else (-1, field.partition ** (len(layers) - 1))
+                exchange += content * face.exchange * np.outer(modes[at], modes[at])
+        thickness = [layer.thickness for layer in layers]
+        return VariedModes(
+            amplitude=self.amplitude,
+            value=np.concatenate([shapes @ of for of in own]),
+            slope=np.concatenate([2.0 / h * (slopes @ of) for h, of in zip(thickness, own, strict=True)]),
+            weight=np.concatenate([0.5 * h * field.partition**slot * weight for slot, h in enumerate(thickness)]),
+            exchange=exchange,
+            curve=np.repeat(np.arange(len(layers)), GAUSS_POINTS),
+            curves=[_curve(field.diffusivity[layer.name]) for layer in layers],
+        )
 
     def _steady(self, stiffness: Array, given: Array, outside: Array) -> Array:
         """Return the steady state where points that are given have the value there, and others that flux in."""
@@ -217,30 +287,36 @@ class FieldModes:
         return found
 
 
-def _element() -> tuple[Array, Array, Array]:
+def _curve(diffusivity: float | DiffusivityCurve) -> tuple[Array, Array]:
+    """Return values of the field, and diffusivities there [m²/s]."""
+    if isinstance(diffusivity, DiffusivityCurve):
+        return np.array(diffusivity.at), np.array(diffusivity.value)
+    return np.zeros(1), np.array([diffusivity])
+
+
+@cache
+def _element(degree: int) -> tuple[Array, Array, Array]:
     """Return Gauss-Lobatto points on −1 … 1, and ∫ φ_i φ_j and ∫ φ_i' φ_j' of the polynomials that are 1 at one of
     them and 0 at the others.
     """
-    last = np.zeros(DEGREE + 1)
+    last = np.zeros(degree + 1)
     last[-1] = 1.0
     points = np.concatenate([[-1.0], np.sort(legendre.legroots(legendre.legder(last)).real), [1.0]])
-    values = np.linalg.inv(legendre.legvander(points, DEGREE))
-    norms = 2.0 / (2.0 * np.arange(DEGREE + 1) + 1.0)
+    values = np.linalg.inv(legendre.legvander(points, degree))
+    norms = 2.0 / (2.0 * np.arange(degree + 1) + 1.0)
     mass = values.T @ (norms[:, None] * values)
-    slopes = np.vstack([legendre.legder(values), np.zeros(DEGREE + 1)])
+    slopes = np.vstack([legendre.legder(values), np.zeros(degree + 1)])
     return points, mass, slopes.T @ (norms[:, None] * slopes)
 
 
-_POINTS, _MASS, _STIFFNESS = _element()
-
-
-def _fading(rod: Rod, layer: Layer, depth: float | None) -> Array:
+def _fading(rod: Rod, layer: Layer, depth: float | None, degree: int) -> Array:
     """Return ∫ g φ dζ of a source g with the mean 1 that fades from the outer face of a layer inwards."""
+    points, mass, _ = _element(degree)
     if depth is None:
-        return _MASS.sum(axis=1)
-    zeta, weight = legendre.leggauss(10 * DEGREE)
+        return mass.sum(axis=1)
+    zeta, weight = legendre.leggauss(10 * degree)
     from_below = len(rod.layers) == 2 and layer is rod.layers[0]
     inwards = 0.5 * layer.thickness * (1.0 + (zeta if from_below else -zeta))
     source = weight * np.exp(-inwards / depth)
-    shapes = legendre.legvander(zeta, DEGREE) @ np.linalg.inv(legendre.legvander(_POINTS, DEGREE))
+    shapes = legendre.legvander(zeta, degree) @ np.linalg.inv(legendre.legvander(points, degree))
     return 2.0 * source @ shapes / source.sum()

@@ -40,6 +40,7 @@ USUAL_UNITS = {
     "Pa": {"Pa": Decimal(1), "kPa": Decimal("1e3"), "MPa": Decimal("1e6"), "GPa": Decimal("1e9")},
     "m/s": {"m/s": Decimal(1), "cm/s": Decimal("1e-2"), "mm/s": Decimal("1e-3")},
     "m/s^2": {"m/s^2": Decimal(1), "mm/s^2": Decimal("1e-3")},
+    "m^2/s": {"m^2/s": Decimal(1), "mm^2/s": Decimal("1e-6")},
     "rad": {"rad": Decimal(1), "deg": _DEGREE, "turn": 360 * _DEGREE, "turns": 360 * _DEGREE},
     "rad/s": {"rad/s": Decimal(1), "deg/s": _DEGREE, "rpm": 6 * _DEGREE},
     "rad/m": {"rad/m": Decimal(1), "rad/mm": Decimal(1000), "deg/mm": 1000 * _DEGREE},

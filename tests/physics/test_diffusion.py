@@ -14,7 +14,7 @@ from bilayer_core.engine.energy_account import NUMERICAL
 from bilayer_core.integrators.integrator_register import INTEGRATORS
 from bilayer_core.model.build_model import build_model
 from bilayer_core.model.validity import validity_figures
-from bilayer_core.scene.diffusion_modes import DEGREE, FieldModes
+from bilayer_core.scene.diffusion_modes import DEGREE, DEGREE_OF_VARIED, FieldModes
 
 GAIN, THICKNESS = 0.01, 1e-3
 WAVE = {"type": "sine", "mean": 0.5, "amplitude": 0.5, "period": 0.2, "phase": -1.5}
@@ -30,6 +30,9 @@ def film(field=None, schedule=None, **more):
     strip = rod(layers, length=0.03, stations=7, clamp_start="wall", diffusion={**whole, **(field or {})})
     water = {"water": {"schedule": schedule or {"type": "hold", "value": 0}}}
     return scene([strip], bodies=[fixed()], stimuli=water, **more)
+
+
+VARIED = {"diffusivity": {"passive": 2e-6, "active": {"at": [0, 1], "value": [3e-7, 3e-6]}}}
 
 
 def reached(simulator):
@@ -61,6 +64,30 @@ def test_the_field_at_a_time_depends_on_neither_steps_nor_integrator(integrator)
         simulator.run(until=0.08)
         expected = reached(simulator) if expected is None else expected
         assert reached(simulator) == pytest.approx(expected, abs=1e-12)
+
+
+def test_a_field_that_moves_the_faster_the_more_of_it_there_is_depends_on_no_step_either():
+    ramp = {"type": "ramp", "start": 0, "end": 0.04, "from": 0, "to": 1}
+    found = []
+    for solver in ({"dt": 1e-2}, {"dt": 1e-3}, {"tolerance": 1e-4}):
+        simulator = Simulator(load_scene(film(VARIED, schedule=ramp) | {"solver": solver}))
+        simulator.run(until=0.08)
+        found.append(reached(simulator))
+    assert len(simulator.model.drives.mode_rising) == 2 * DEGREE_OF_VARIED
+    assert found[0] == pytest.approx(found[1], abs=1e-5)
+    assert found[2] == pytest.approx(found[1], abs=1e-5)
+    assert found[0][0] < 0.97  # it is still on its way
+
+
+@pytest.mark.parametrize("exchange", [None, 2e-3])
+def test_a_curve_that_is_constant_is_a_number(exchange):
+    found = []
+    for value in (1e-6, {"at": [0.3], "value": [1e-6]}):
+        field = {"diffusivity": {"passive": 2e-6, "active": value}, "top": {"exchange": exchange}}
+        simulator = Simulator(load_scene(film(field, schedule=WAVE)))
+        simulator.run(0.05)
+        found.append(reached(simulator))
+    assert found[0] == pytest.approx(found[1], abs=2e-4)
 
 
 def test_a_settled_layer_has_its_stimulus_everywhere_and_so_has_a_scene_at_its_start():
@@ -98,8 +125,9 @@ def test_what_the_stimulus_supplies_by_mean_and_gradient_is_in_budget_and_accoun
     assert lost[1] < 0.3 * lost[0] < 1e-5
 
 
-def test_a_state_within_a_wave_goes_on_bit_for_bit():
-    content = film(schedule=WAVE)
+@pytest.mark.parametrize("field", [{}, VARIED])
+def test_a_state_within_a_wave_goes_on_bit_for_bit(field):
+    content = film(field, schedule=WAVE)
     simulator = Simulator(load_scene(content))
     simulator.run(0.05)
     saved = simulator.save_state()
@@ -110,9 +138,10 @@ def test_a_state_within_a_wave_goes_on_bit_for_bit():
     assert np.array_equal(other.save_state(), simulator.save_state(), equal_nan=True)
 
 
-def test_a_log_is_made_again_bit_for_bit(tmp_path):
+@pytest.mark.parametrize("field", [{}, VARIED])
+def test_a_log_is_made_again_bit_for_bit(tmp_path, field):
     path, log = tmp_path / "film.yaml", tmp_path / "film.mcap"
-    path.write_text(yaml.safe_dump(film(schedule=WAVE, duration=0.1)))
+    path.write_text(yaml.safe_dump(film(field, schedule=WAVE, duration=0.1)))
     assert main(["run", str(path), "--log", str(log), "--quiet"]) == 0
     assert main(["replay", str(log), "--verify"]) == 0
 
@@ -148,6 +177,27 @@ ALONE = {"diffusivity": {"active": 1e-6}, "partition": 1.0}
     [
         ({"diffusivity": {"active": 0}}, "diffusivity.active: found 0;", "a diffusivity [m^2/s] above 0"),
         ({"diffusivity": {"active": -1e-9}}, "diffusivity.active: found -1e-09;", "a diffusivity [m^2/s] above 0"),
+        (
+            {"diffusivity": {"active": {"at": [0, 0.5, 0.5], "value": [1e-9, 1e-9, 1e-9]}}},
+            "diffusivity.active.at",
+            "must be above the value before it (0.5)",
+        ),
+        (
+            {"diffusivity": {"active": {"at": [0, 1], "value": [1e-9]}}},
+            "diffusivity.active.value",
+            "must be as many as `at`, 2",
+        ),
+        (
+            {"diffusivity": {"active": {"at": [0], "value": [0]}}},
+            "diffusivity.active.value",
+            "must be a diffusivity [m^2/s] above 0",
+        ),
+        ({**VARIED, "along": True}, "along", "must be false where a diffusivity depends on the field"),
+        (
+            {**VARIED, "source": {"layer": "active", "rate": 1}},
+            "source",
+            "must be left out where a diffusivity depends",
+        ),
         ({"diffusivity": {"activ": 1e-9}, "partition": 1.0}, "diffusivity.activ: ", "did you mean active"),
         ({"diffusivity": {}}, "diffusivity: found {}", "must name a layer or two"),
         ({"topp": {}}, "topp", "unknown key, did you mean top?"),

@@ -15,6 +15,7 @@ BUNDLED = {
     "bending": (2, "all stays in the plane y = 0"),
     "cantilever": (2, "all stays in the plane y = 0"),
     "crawling_dual_leg": (3, "rods.hind_foot leaves the plane y = 0"),
+    "crawling_film": (2, "all stays in the plane y = 0"),
     "crawling_inchworm": (2, "all stays in the plane y = 0"),
     "flagellum": (2, "all stays in the plane y = 0"),
     "gripping": (3, "rods.arm_1 leaves the plane y = 0"),

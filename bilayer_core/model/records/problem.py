@@ -24,6 +24,7 @@ from bilayer_core.model.records.parts import (
     Strands,
     Viscosity,
 )
+from bilayer_core.model.records.varied_fields import VariedFields
 
 
 @record
@@ -163,6 +164,7 @@ class Problem:
     strands: Strands
     viscosity: Viscosity
     drives: Drives
+    varied_fields: VariedFields
     light: Light
     space: Space
     plane: Plane

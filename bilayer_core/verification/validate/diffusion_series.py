@@ -6,6 +6,7 @@ import math
 from functools import cache
 
 import numpy as np
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from bilayer_core.scene.loader import load_scene
@@ -89,7 +90,11 @@ def _strains(simulator: Simulator) -> tuple[float, float]:
 @cache
 def _wetted(name: str, model: str, dimension: int) -> list[tuple[float, float]]:
     """Return strain and curvature of a film at `TIMES` after its stimulus has jumped to 1."""
-    simulator = Simulator(load_scene(_films()[name]), model=model, dimension=dimension, dt=0.1)
+    return _looked_at(_films()[name], model, dimension)
+
+
+def _looked_at(content: dict, model: str, dimension: int) -> list[tuple[float, float]]:
+    simulator = Simulator(load_scene(content), model=model, dimension=dimension, dt=0.1)
     simulator.set_stimulus("water", 1.0)
     found = []
     for time in TIMES:
@@ -116,6 +121,46 @@ def overshoot() -> tuple[float, float]:
         simulator.step()
         largest = max(largest, _strains(simulator)[1])
     return largest, _peak()
+
+
+CURVE = (0.2, 1.0, 2.0)
+"""D over h²/`TIME` at the contents 0, ½ and 1, linear between them."""
+
+
+@cache
+def _varied(time: float) -> tuple[float, float]:
+    """Return mean and gradient of a field with the diffusivity `CURVE` at D t/h², by finite volumes."""
+    cells = 400 if time < 0.05 else 100
+    found = [np.array(_of_varied_volumes(time, count)) for count in (cells // 2, cells)]
+    return tuple((found[1] + (found[1] - found[0]) / 3.0).tolist())
+
+
+def _of_varied_volumes(time: float, cells: int) -> tuple[float, float]:
+    def rates(_: float, a: Array) -> Array:
+        beyond = np.append(a, 2.0 - a[-1])  # mirrored, so that the face has 1
+        between = np.interp(0.5 * (beyond[1:] + beyond[:-1]), (0.0, 0.5, 1.0), CURVE)
+        return np.diff(between * np.diff(beyond) * cells, prepend=0.0) * cells
+
+    near = np.eye(cells) + np.eye(cells, k=1) + np.eye(cells, k=-1)
+    found = solve_ivp(rates, (0.0, time), np.zeros(cells), method="BDF", rtol=1e-8, atol=1e-10, jac_sparsity=near)
+    zeta = (np.arange(cells) + 0.5) / cells * 2.0 - 1.0
+    return float(found.y[:, -1].mean()), float(3.0 * np.mean(found.y[:, -1] * zeta))
+
+
+@cache
+def _varied_film(model: str, dimension: int) -> list[tuple[float, float]]:
+    unit = THICKNESS**2 / TIME
+    content = one_layer({"top": WET})
+    curve = {"at": [0.0, 0.5, 1.0], "value": [unit * value for value in CURVE]}
+    content["rods"][0]["diffusion"]["diffusivity"]["only"] = curve
+    return _looked_at(content, model, dimension)
+
+
+def with_varied_diffusivity(at: int, which: int, model: str, dimension: int) -> tuple[float, float]:
+    """Return mean (0) or gradient (1) of the field of a film in which water moves the faster the more of it there is,
+    and by finite volumes.
+    """
+    return _varied_film(model, dimension)[at][which], _varied(TIMES[at])[which]
 
 
 THICK = 0.6e-3
@@ -240,6 +285,20 @@ CASES: list[Case] = [
             ("exchange at one face", "laminate", 2),
             ("heated layer", "laminate", 2),
         )
+        for which in (0, 1)
+        for at, time in enumerate(TIMES)
+    ),
+    *(
+        Case(
+            f"diffusion/diffusivity 1 to 10/{('mean', 'gradient')[which]}, D t/h² {time:g}/{model}, {dimension}-D",
+            "finite volumes, at least 100 and 50, extrapolated; BDF to 1e-8",
+            1e-3,
+            lambda at=at, which=which, model=model, dimension=dimension: with_varied_diffusivity(
+                at, which, model, dimension
+            ),
+            scale=(1.0, 0.576)[which],
+        )
+        for model, dimension in (("laminate", 2), ("two_rod", 3))
         for which in (0, 1)
         for at, time in enumerate(TIMES)
     ),

@@ -1,0 +1,139 @@
+"""Diffusion with a diffusivity that depends on the field: steps in the coordinates of its modes.
+
+With w = a − u = Σ q_m v_m(z), q_m = γ_m (y_m − u), the equation of `scene.diffusion_modes` is, for faces that see the
+stimulus u and without sources,
+
+    q′ = −γ u′ − K(a) q,    K_mn(a) = ∫ S D(a) v_m′ v_n′ dz + Σ h S v_m v_n at faces with exchange
+
+The integral is a sum over Gauss points. A step with K held at its start,
+
+    (1 + h K(a₀)) q₁ = q₀ − h γ u′,
+
+damps fast modes whatever h. Its error is a series in h, so steps of h, h/2 and h/3 are extrapolated to third order
+(Aitken and Neville); the last two values tell the error, by which h is chosen. The same values give the same steps, so
+runs that are continued or replayed stay the same bit for bit. States keep y, as for any field.
+"""
+
+from __future__ import annotations
+
+import math
+
+from bilayer_core.jit import kernel
+from bilayer_core.kinematics.copying import copy
+
+LEVELS = 3
+SAFETY, LEAST_FACTOR, LARGEST_FACTOR = 0.8, 0.2, 4.0
+SHORTEST = 1e-9
+"""Of the time to go: a step of the field that is taken whatever its error."""
+
+
+@kernel
+def _diffusivity(varied, g, a):
+    """Return the diffusivity at a point for a value of the field: linear along its curve, constant beyond [m²/s]."""
+    first, last = varied.curve_first[varied.curve[g]], varied.curve_first[varied.curve[g] + 1] - 1
+    if a <= varied.curve_at[first]:
+        return varied.curve_value[first]
+    k = first
+    while k < last and varied.curve_at[k + 1] < a:
+        k += 1
+    if k == last:
+        return varied.curve_value[last]
+    part = (a - varied.curve_at[k]) / (varied.curve_at[k + 1] - varied.curve_at[k])
+    return varied.curve_value[k] + part * (varied.curve_value[k + 1] - varied.curve_value[k])
+
+
+@kernel
+def _step(varied, own, size, u, push, h, amplitude, q):
+    """Make a step of length h [s] from the stimulus u, which changes by `push` a second, in place."""
+    matrix, entry, square = varied.matrix, varied.entry[own], varied.square[own]
+    for i in range(size):
+        for j in range(i + 1):
+            matrix[i, j] = h * varied.exchange[square + i * size + j]
+        matrix[i, i] += 1.0
+    for g in range(varied.point[own], varied.point[own + 1]):
+        at = entry + (g - varied.point[own]) * size
+        a = u
+        for i in range(size):
+            a += varied.value[at + i] * q[i]
+        stiff = h * varied.weight[g] * _diffusivity(varied, g, a)
+        for i in range(size):
+            part = stiff * varied.slope[at + i]
+            for j in range(i + 1):
+                matrix[i, j] += part * varied.slope[at + j]
+    for i in range(size):
+        q[i] -= h * push * varied.amplitude[amplitude + i]
+    for j in range(size):  # Cholesky, and both triangles
+        for k in range(j):
+            matrix[j, j] -= matrix[j, k] * matrix[j, k]
+        matrix[j, j] = math.sqrt(matrix[j, j])
+        for i in range(j + 1, size):
+            for k in range(j):
+                matrix[i, j] -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] /= matrix[j, j]
+    for i in range(size):
+        for k in range(i):
+            q[i] -= matrix[i, k] * q[k]
+        q[i] /= matrix[i, i]
+    for n in range(size):
+        i = size - 1 - n
+        for k in range(i + 1, size):
+            q[i] -= matrix[k, i] * q[k]
+        q[i] /= matrix[i, i]
+
+
+@kernel
+def _extrapolate(varied, own, size, u, push, h, amplitude):
+    """Write q after a step of length h [s] to `moved`; its error, the root mean square over the thickness."""
+    level, q = varied.level, varied.moved
+    square = whole = 0.0
+    for n in range(LEVELS):
+        copy(varied.present, q)
+        part = h / (n + 1)
+        for k in range(n + 1):
+            _step(varied, own, size, u + push * (k * part), push, part, amplitude, q)
+        for i in range(size):
+            better = q[i]  # level[k, i] is that of n parts, extrapolated k times
+            for k in range(n):
+                before = level[k, i]
+                level[k, i] = better
+                better += (better - before) / ((n + 1) / (n - k) - 1.0)
+            level[n, i] = better
+            if n == LEVELS - 1:
+                square += (better - level[n - 1, i]) ** 2
+                whole += varied.amplitude[amplitude + i] ** 2
+    for i in range(size):
+        q[i] = level[LEVELS - 1, i]
+    return math.sqrt(square / whole)
+
+
+@kernel
+def diffuse(varied, drives, f, reached, first, last, dt, reached_out):
+    """Advance a field by a time while its stimulus goes linearly from `first` to `last`.
+
+    Parameters
+    ----------
+    varied : VariedFields
+    drives : Drives
+    f : int
+        The field, one of `varied`.
+    reached, reached_out : Vector
+        y of all modes at the start and, of this field, at the end [unit of the stimulus].
+    first, last : float
+        The stimulus, after a jump at the start.
+    dt : float
+        [s]
+    """
+    own, begin = varied.number[f], drives.field_first[f]
+    size, push, time, h = drives.field_first[f + 1] - begin, (last - first) / dt, 0.0, dt
+    for i in range(size):
+        varied.present[i] = varied.amplitude[begin + i] * (reached[begin + i] - first)
+    while time < dt:
+        h = min(h, dt - time)
+        error = _extrapolate(varied, own, size, first + push * time, push, h, begin) / varied.tolerance[own]
+        factor = LARGEST_FACTOR if error == 0.0 else SAFETY * error ** (-1.0 / LEVELS)
+        if error <= 1.0 or h <= SHORTEST * dt:
+            time = dt if h == dt - time else time + h
+            copy(varied.moved, varied.present)
+        h *= min(max(factor, LEAST_FACTOR), LARGEST_FACTOR)
+    for i in range(size):
+        reached_out[begin + i] = last + varied.present[i] / varied.amplitude[begin + i]

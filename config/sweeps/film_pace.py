@@ -1,0 +1,41 @@
+"""The crawling film with a swelling layer of another thickness and another wave of humidity, and how fast it goes."""
+
+import math
+
+import numpy as np
+
+MEASURED = 8
+"""Periods at the end of a run over which speed is taken."""
+SLOWEST = 4.0 / math.pi**2
+"""Time constant of the slowest mode over h²/D, of a layer with one wet face."""
+
+
+def change(content, parameters):
+    """Set the thickness of the upper layer and the period of the humidity.
+
+    Parameters
+    ----------
+    content : dict
+        In SI units.
+    parameters : dict
+        `thickness` of the swelling layer [um] and `period` of the humidity [s].
+    """
+    rod, period, thickness = content["rods"][0], parameters["period"], 1e-6 * parameters["thickness"]
+    rod["layers"][1]["thickness"] = thickness
+    content["stimuli"]["humidity"]["schedule"] |= {"period": period, "rise_time": 0.05 * period}
+    settling = 4.0 * SLOWEST * thickness**2 / rod["diffusion"]["diffusivity"]["active"]
+    content["duration"] = period * (math.ceil(settling / period) + MEASURED)
+    return content
+
+
+def stride(run):
+    """Return the mean way of the mass centre along x in one of the last periods [mm]."""
+    period, com = run.parameters["period"], run.recording["com"]
+    end = run.simulator.scene.duration
+    x = np.interp([end - MEASURED * period, end], run.recording.times, com.values[:, 0])
+    return 1e3 * float(x[1] - x[0]) / MEASURED
+
+
+def speed(run):
+    """Return the mean speed of the mass centre along x over the last periods [mm/s]."""
+    return stride(run) / run.parameters["period"]
