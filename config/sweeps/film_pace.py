@@ -1,4 +1,4 @@
-"""The crawling film with a swelling layer of another thickness and another wave of humidity, and how fast it goes."""
+"""The crawling film with another thickness and another wave of humidity, and how fast it goes."""
 
 import math
 
@@ -11,7 +11,10 @@ SLOWEST = 4.0 / math.pi**2
 
 
 def change(content, parameters):
-    """Set the thickness of the upper layer and the period of the humidity.
+    """Set the thickness of the film and the period of the humidity.
+
+    The weight of the film grows as its thickness. So does its bending stiffness, if the modulus falls as 1/thickness²;
+    and if the gain grows as the thickness, all films have the same curvature.
 
     Parameters
     ----------
@@ -21,7 +24,13 @@ def change(content, parameters):
         `thickness` of the swelling layer [um] and `period` of the humidity [s].
     """
     rod, period, thickness = content["rods"][0], parameters["period"], 1e-6 * parameters["thickness"]
-    rod["layers"][1]["thickness"] = thickness
+    passive, active = rod["layers"]
+    factor = thickness / active["thickness"]
+    rod["path"]["start"][2] += (factor - 1.0) * passive["thickness"]  # as far above the ground
+    for layer in (passive, active):
+        layer["thickness"] *= factor
+    active["eigenstrain"]["gain"] *= factor
+    content["materials"]["film"]["youngs_modulus"] /= factor**2
     content["stimuli"]["humidity"]["schedule"] |= {"period": period, "rise_time": 0.05 * period}
     settling = 4.0 * SLOWEST * thickness**2 / rod["diffusion"]["diffusivity"]["active"]
     content["duration"] = period * (math.ceil(settling / period) + MEASURED)
