@@ -42,9 +42,10 @@ from bilayer_core.engine.kinetic import kinetic_energy
 from bilayer_core.engine.laws import eigenstrain_of
 from bilayer_core.engine.powers import BY_FLOW, in_barriers, write_forces_of_laws
 from bilayer_core.forces.added_mass import fluid_momentum, move_fluid
+from bilayer_core.forces.flattening import pull_of_rest, share_of_rest
 from bilayer_core.forces.inertia import second_moment_beyond
 from bilayer_core.forces.raised import inertia_off_curve
-from bilayer_core.jit import kernel, piece
+from bilayer_core.jit import kernel, piece, record_at
 from bilayer_core.jit.called import stack_matrix
 from bilayer_core.kinematics.copying import copy
 from bilayer_core.kinematics.vector import row
@@ -54,6 +55,7 @@ from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Stage, StageInputs, StateArrays, Work
 
+configuration_at = record_at(Configuration)
 ENERGY, IN_BARRIERS, POWER_SUPPLIED, POWER_LOST, POWER_BARRIER, POWER_DAMPING = range(6)
 FREE, LOWEST, LARGEST, NUMERICAL, GRAVITY_AT_START, OPEN, MADE, UNSURE = range(6, 14)
 """Slots of `State.account`: T + V, and the part of V in barriers [J]; powers at the end of the last step, and of what
@@ -167,6 +169,8 @@ def _supply_by_jumps(p, state, inputs, work):
             jumps = True
     if not jumps:
         return
+    if p.flattening.exists:
+        pull_of_rest(p, configuration_at(work.configurations[0]), stage)
     stage.rest_edge[:], stage.rest_joint[:, 0] = 0.0, 0.0  # scratch until a stage begins
     for k in range(drives.driven_edge.shape[0]):
         stage.rest_edge[drives.driven_edge[k]] += drives.driven_weight[k] * work.strain[drives.driven_law[k]]
@@ -179,6 +183,14 @@ def _supply_by_jumps(p, state, inputs, work):
         work.start_force[drives.driven_law[k]] -= drives.driven_weight[k] * force
     for k in range(drives.driven_joint.shape[0]):
         j = drives.driven_joint[k]
+        if p.flattening.exists:
+            i, share = share_of_rest(p.flattening, j)
+            if i >= 0:
+                bent, along = stage.rest_joint[p.flattening.first + i, 0], stage.rest_joint[p.flattening.joint[i], 0]
+                pull = share * p.flattening.pull[i, 1] * (bent + p.flattening.poisson[i] * along)
+                work.start_force[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * pull
+            if j >= p.flattening.first:
+                continue
         moment = strands.joint_stiffness[j, 0] * stage.rest_joint[j, 0]
         work.start_force[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * moment
     for i in range(work.start_strain.shape[0]):

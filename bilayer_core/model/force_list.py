@@ -155,6 +155,10 @@ def _restitution(q: Question) -> str | None:
     return _unless(bodies, "no body that can touch anything")
 
 
+def _flattening(q: Question) -> str | None:
+    return _unless(any(rod.section == "strip" for rod in q.scene.rods), "no rod has `section: strip`")
+
+
 def _rod_barrier(q: Question) -> str | None:
     if q.rods_touch:
         return None
@@ -178,6 +182,7 @@ FORCES: tuple[Force, ...] = (
     Force("stretching", CONSERVATIVE, "stretch.py", _always),
     Force("bending", CONSERVATIVE, "bend_twist.py", _always),
     Force("twisting", CONSERVATIVE, "bend_twist.py", lambda q: _unless(q.dimension == 3, "nothing twists in a plane")),
+    Force("flattening", CONSERVATIVE, "flattening.py", _flattening),
     Force("bond", CONSERVATIVE, "bond.py", _bond),
     Force("joints", CONSERVATIVE, "joints.py", _joints),
     Force("joint friction", DISSIPATIVE, "mechanisms.py", _joint_friction),

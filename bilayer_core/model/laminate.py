@@ -114,6 +114,10 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
     found.rods += [[(0, int(nodes[-1]), strand.first_node, strand.first_edge)] for strand in strands]
     found.path_height += [path] * len(copies)
     joints = add_strands(found, scene, rod, strands, shape, elements, body_index)
+    if rod.section == "strip":
+        own = np.sort(joints[joints >= 0])
+        ratio = scene.materials[rod.layers[0].material].poisson_ratio
+        found.add(strip_joint=own, strip_poisson=np.full(len(own), ratio))
     coupling = whole.strain_coupling()
     coupled = coupling.any(axis=-1) & (joints >= 0)
     found.add(coupled_joint=joints[coupled], strain_coupling=coupling[coupled])
@@ -320,6 +324,10 @@ def _add_eigenstrain(
             weight = weight[:, driven]
             of_edges.append((first_edge + driven, np.full(weight.shape, number), weight))
             bent = (bend != 0.0) & (joints >= 0)
+            if rod.section == "strip" and layer.swelling != "along":
+                found.add(curled_joint=joints[bent], curled_law=np.full(bent.sum(), number), curled_weight=bend[bent])
+            if layer.swelling == "across":
+                weight, bent = 0.0 * weight, np.zeros_like(bent)
             copy, _ = np.nonzero(bent)
             of_joints.append((copy, joints[bent], np.full(len(copy), number), bend[bent]))
     if not of_edges:

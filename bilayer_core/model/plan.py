@@ -78,6 +78,9 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
     chosen_model, reasons["model"] = _choose("model", model, solver.model, MODELS) or simplest_model(scene)
     if chosen_model == "laminate":
         _refuse_laminate(scene)
+    for rod in scene.rods:
+        if rod.section == "strip":
+            _refuse_strip(scene, rod, chosen_model)
     asked = _choose("dimension", dimension, solver.dimension, DIMENSIONS)
     if asked is not None and asked[0] == 2:
         asked = 2, f"{asked[1]}: all stays in {require_plane(scene)}"
@@ -133,6 +136,8 @@ def simplest_model(scene: SceneConfig) -> tuple[str, str]:
     if scene.coupling != Coupling():
         return "two_rod", "`coupling` is set: only the two-rod model has a bond that gives"
     for rod in scene.rods:
+        if rod.section == "strip":
+            return "laminate", f"rods.{rod.name}: `section: strip`; only one curve has a section that bends"
         if len(_retardation_times(rod, scene)) > 1:
             return "two_rod", f"rods.{rod.name}: layers with different retardation times, of which a curve has one"
         error = helix_error(scene, rod)
@@ -154,6 +159,21 @@ def _refuse_laminate(scene: SceneConfig) -> None:
                 f"model: laminate has one retardation time along a rod, the layers of rods.{rod.name} have "
                 f"{' and '.join(f'{time:g} s' for time in sorted(times))}; allowed: two_rod, or equal times"
             )
+
+
+def _refuse_strip(scene: SceneConfig, rod: Rod, model: str) -> None:
+    if model == "two_rod":
+        raise SceneError(
+            f"model: two_rod has layers that keep their section, and the bond of rods.{rod.name} (`section: strip`) "
+            "has no part across the width; allowed: laminate"
+        )
+    ratios = {scene.materials[layer.material].poisson_ratio for layer in rod.layers}
+    if len(ratios) > 1:
+        raise SceneError(
+            f"rods.{rod.name}.section: strip needs layers with one poisson_ratio, has "
+            f"{' and '.join(f'{ratio:g}' for ratio in sorted(ratios))}: unlike ones curl across by themselves; "
+            "allowed: beam, or equal ratios"
+        )
 
 
 def _is_viscous(scene: SceneConfig) -> bool:

@@ -58,6 +58,10 @@ class Layer(Part):
     """Of the layer by itself, through the thickness, positive where it bends to the normal; default: the path's."""
     natural_curvature_across: varying(Curvature) | None = None
     """Of the layer by itself, across the width, positive where it bends to path × normal; default: the path's."""
+    swelling: Literal["isotropic", "along", "across"] = "isotropic"
+    """Direction in the layer's plane in which its eigenstrain acts: all, or one along or across the path, as that of
+    aligned fibres. A rod with `section: strip` curls across as well.
+    """
     natural_twist: varying(Twist) = 0.0
     """Of the layer by itself, about the path, beside the twist of the path."""
 
@@ -101,6 +105,10 @@ class Rod(Part):
     """Cross-sections along the path, both ends included; the last one of a closed path is the first again."""
     layers: list[Layer] = Field(min_length=1, max_length=2)
     """Bottom first."""
+    section: Literal["beam", "strip"] = "beam"
+    """`beam`: the section keeps its shape, right for w²κ/H below about 1; `strip`: it curls across the width, of any
+    width.
+    """
     torsion: Literal["laminate", "layers"] = "laminate"
     """Torsional stiffness: of the bonded section, or the sum of the layers' own."""
     friction_axis: Literal["path", "normal", "across"] = "path"
@@ -300,6 +308,7 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
             "one layer must cover the whole path; layers that each cover a part of it are two rods, joined by a body"
         )
         faults.append((("layers",), [layer.interval for layer in rod.layers], demand))
+    faults += _faults_of_section(rod)
     faults += _faults_of_copies(rod) if rod.pattern is not None else ()
     for key in ("velocity", "angular_velocity"):
         if getattr(rod, key) is not None and any(variant.clamp_start or variant.clamp_end for variant in rod.variants):
@@ -336,6 +345,22 @@ def _sections(rod: Rod) -> Iterator[Fault]:
             faults.append((("inner_radius",), float(inner[worst]), demand))
     yield from faults
     vars(rod).update(width=diameter, layers=[rod.layers[0].model_copy(update={"thickness": diameter})])
+
+
+def _faults_of_section(rod: Rod) -> Iterator[Fault]:
+    """Yield the faults of layers that a strip, or a beam, cannot have."""
+    for index, layer in enumerate(rod.layers):
+        if rod.section == "beam":
+            if layer.swelling == "across":
+                demand = "must be isotropic or along: a beam does not feel it; `section: strip` of the rod does"
+                yield ("layers", index, "swelling"), layer.swelling, demand
+            continue
+        if layer.interval is not None:
+            demand = "must be left out: the layers of a strip (`section: strip`) cover all of it"
+            yield ("layers", index, "interval"), layer.interval, demand
+        for key in ("thickness", "stiffness"):
+            if isinstance(getattr(layer, key), Profile):
+                yield ("layers", index, key), "a profile", "must be the same all along a strip (`section: strip`)"
 
 
 LEAST_CLOSED = 5
