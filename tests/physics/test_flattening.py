@@ -8,7 +8,7 @@ from support.evaluations import Problem, check
 from support.sample_scenes import GEL, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.errors import SceneError
+from bilayer_core.errors import SceneError, SimulationError
 from bilayer_core.forces.flattening import SERIES, flatness
 
 TABLE = {
@@ -21,8 +21,10 @@ TABLE = {
 WIDTH, THICKNESS = 20e-3, 0.2e-3
 
 
-def free_curvature(ratio, poisson, swelling="isotropic"):
-    """κ/κ₀ of a clamped strip of two like layers at rest, by its w²κ₀/H."""
+def swollen(ratio, poisson, swelling="isotropic", dimension=3, values=(1.0,)):
+    """A clamped strip of two like layers, by its w²κ₀/H, at rest after each value of its stimulus: the last report, and
+    κ/κ₀.
+    """
     curvature = ratio * THICKNESS / WIDTH**2
     law = {"stimulus": "heat", "gain": curvature * THICKNESS / 1.5}
     half = {"thickness": 0.5 * THICKNESS}
@@ -34,13 +36,16 @@ def free_curvature(ratio, poisson, swelling="isotropic"):
                 [strip],
                 bodies=[fixed()],
                 materials={"gel": {**GEL, "poisson_ratio": poisson}},
-                stimuli={"heat": {"schedule": {"type": "hold", "value": 1}}},
+                stimuli={"heat": {"schedule": {"type": "hold", "value": 0}}},
             )
         ),
         model="laminate",
+        dimension=dimension,
     )
-    simulator.solve_static()
-    return float(np.mean(simulator.curvatures)) / curvature
+    for value in values:
+        simulator.set_stimulus("heat", value)
+        report = simulator.solve_static()
+    return report, simulator.curvatures / curvature
 
 
 HUMID = {"stimulus": "humidity", "gain": 0.02}
@@ -85,14 +90,35 @@ def test_flatness_and_its_derivatives_are_smooth_where_its_series_ends():
 
 
 @pytest.mark.parametrize("poisson", [0.3, 0.5])
-def test_free_strips_of_every_width_curl_as_plates_do(poisson):
+def test_strips_of_every_width_that_were_held_flat_curl_as_plates_do(poisson):
     for ratio, wanted in TABLE[poisson].items():
-        assert free_curvature(ratio, poisson) == pytest.approx(wanted, rel=2e-3), ratio
+        report, curvature = swollen(ratio, poisson)
+        assert curvature == pytest.approx(np.full(11, wanted), rel=2e-3), ratio
+        assert (report.stable, dict(report.strips)) == (True, {"rod": "curled along"})
+
+
+@pytest.mark.parametrize("poisson", [0.3, 0.5])
+def test_strips_in_a_plane_curl_as_plates_do_while_their_stimulus_grows(poisson):
+    for ratio, wanted in TABLE[poisson].items():
+        _, curvature = swollen(ratio, poisson, dimension=2, values=np.geomspace(0.05, 1.0, 20))
+        assert curvature == pytest.approx(np.full(11, wanted), rel=2e-3), ratio
+
+
+def test_a_strip_held_flat_in_a_plane_rolls_up_across_where_only_twist_leads_on():
+    report, curvature = swollen(36.0, 0.5, dimension=2)
+    assert np.abs(curvature).max() < 0.03
+    assert dict(report.strips) == {"rod": "rolled across"}
+    assert report.out_of_plane == report.unstable_directions > 0
+
+
+def test_a_strip_that_folds_at_rest_is_refused_since_the_mesh_would_say_where():
+    with pytest.raises(SimulationError, match=r"rods\.rod folds: .* raise its stimulus in steps"):
+        swollen(100.0, 0.5, dimension=2, values=(0.1, 0.2, 0.3))
 
 
 @pytest.mark.parametrize(("swelling", "wanted"), [("along", 1.0), ("across", 0.0)])
 def test_fibres_leave_the_curvature_along_at_that_of_a_narrow_strip(swelling, wanted):
-    assert free_curvature(6.0, 0.3, swelling) == pytest.approx(wanted, abs=1e-9)
+    assert swollen(6.0, 0.3, swelling)[1] == pytest.approx(np.full(11, wanted), abs=1e-9)
 
 
 @pytest.mark.parametrize("swelling", ["isotropic", "across"])
