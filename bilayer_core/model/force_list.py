@@ -17,6 +17,7 @@ from bilayer_core.model.findings import few
 from bilayer_core.model.free_motions import mechanisms_of
 from bilayer_core.model.friction_pairs import friction_of_rods, slides
 from bilayer_core.model.rod_pairs import RodPair, rod_pairs
+from bilayer_core.model.strip_choice import section_of
 from bilayer_core.scene.body import Prescribed
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.load import Load
@@ -156,7 +157,8 @@ def _restitution(q: Question) -> str | None:
 
 
 def _flattening(q: Question) -> str | None:
-    return _unless(any(rod.section == "strip" for rod in q.scene.rods), "no rod has `section: strip`")
+    strips = q.model == "laminate" and any(section_of(q.scene, rod) == "strip" for rod in q.scene.rods)
+    return _unless(strips, "no rod is a strip (`section`)")
 
 
 def _rod_barrier(q: Question) -> str | None:

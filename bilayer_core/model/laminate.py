@@ -33,6 +33,7 @@ from bilayer_core.model.strands import (
     strand_shape,
     with_copies,
 )
+from bilayer_core.model.strip_choice import section_of
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.pattern import stacked
 from bilayer_core.scene.profile import values_at
@@ -114,7 +115,7 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
     found.rods += [[(0, int(nodes[-1]), strand.first_node, strand.first_edge)] for strand in strands]
     found.path_height += [path] * len(copies)
     joints = add_strands(found, scene, rod, strands, shape, elements, body_index)
-    if rod.section == "strip":
+    if section_of(scene, rod) == "strip":
         own = np.sort(joints[joints >= 0])
         ratio = scene.materials[rod.layers[0].material].poisson_ratio
         found.add(strip_joint=own, strip_poisson=np.full(len(own), ratio))
@@ -308,6 +309,7 @@ def _add_eigenstrain(
     first_edge = np.array([[strand.first_edge] for strand in strands])
     of_edges: list[tuple[Array, ...]] = []
     of_joints: list[tuple[Array, ...]] = []
+    strip = section_of(scene, rod) == "strip"
     followed = [(layer, law, part) for layer, part in zip(rod.layers, parts, strict=True) for law in layer.eigenstrain]
     for layer, law, part in followed:
         edges, covered = np.array(rod.driven_edges(layer, law)), driven_cells(rod, cells, layer, law)
@@ -324,7 +326,7 @@ def _add_eigenstrain(
             weight = weight[:, driven]
             of_edges.append((first_edge + driven, np.full(weight.shape, number), weight))
             bent = (bend != 0.0) & (joints >= 0)
-            if rod.section == "strip" and layer.swelling != "along":
+            if strip and layer.swelling != "along":
                 found.add(curled_joint=joints[bent], curled_law=np.full(bent.sum(), number), curled_weight=bend[bent])
             if layer.swelling == "across":
                 weight, bent = 0.0 * weight, np.zeros_like(bent)

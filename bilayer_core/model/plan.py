@@ -18,6 +18,7 @@ from bilayer_core.model.planarity import find_plane, require_plane
 from bilayer_core.model.redundancy import redundant_joints, require_possible_motion
 from bilayer_core.model.rod_pairs import RodPair, passing_warnings, rod_pairs
 from bilayer_core.model.rods import snapped_layers
+from bilayer_core.model.strip_choice import refusal, section_of
 from bilayer_core.model.twisted import HELIX, helix_error, twist_figures
 from bilayer_core.model.validity import validity_warnings
 from bilayer_core.scene.config import Coupling, SceneConfig
@@ -79,7 +80,7 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
     if chosen_model == "laminate":
         _refuse_laminate(scene)
     for rod in scene.rods:
-        if rod.section == "strip":
+        if section_of(scene, rod) == "strip":
             _refuse_strip(scene, rod, chosen_model)
     asked = _choose("dimension", dimension, solver.dimension, DIMENSIONS)
     if asked is not None and asked[0] == 2:
@@ -136,8 +137,8 @@ def simplest_model(scene: SceneConfig) -> tuple[str, str]:
     if scene.coupling != Coupling():
         return "two_rod", "`coupling` is set: only the two-rod model has a bond that gives"
     for rod in scene.rods:
-        if rod.section == "strip":
-            return "laminate", f"rods.{rod.name}: `section: strip`; only one curve has a section that bends"
+        if section_of(scene, rod) == "strip":
+            return "laminate", f"rods.{rod.name}: its section bends (`section: {rod.section}`), which two rods cannot"
         if len(_retardation_times(rod, scene)) > 1:
             return "two_rod", f"rods.{rod.name}: layers with different retardation times, of which a curve has one"
         error = helix_error(scene, rod)
@@ -167,13 +168,8 @@ def _refuse_strip(scene: SceneConfig, rod: Rod, model: str) -> None:
             f"model: two_rod has layers that keep their section, and the bond of rods.{rod.name} (`section: strip`) "
             "has no part across the width; allowed: laminate"
         )
-    ratios = {scene.materials[layer.material].poisson_ratio for layer in rod.layers}
-    if len(ratios) > 1:
-        raise SceneError(
-            f"rods.{rod.name}.section: strip needs layers with one poisson_ratio, has "
-            f"{' and '.join(f'{ratio:g}' for ratio in sorted(ratios))}: unlike ones curl across by themselves; "
-            "allowed: beam, or equal ratios"
-        )
+    if why := refusal(scene, rod):
+        raise SceneError(f"rods.{rod.name}.section: strip {why}; allowed: beam")
 
 
 def _is_viscous(scene: SceneConfig) -> bool:

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 from bilayer_core.model.edge_figures import EdgeFigures, edge_figures
-from bilayer_core.model.plate_strip import curved_stiffness, folds, swollen_curvature
-from bilayer_core.scene.config import SceneConfig
+from bilayer_core.model.findings import Figure
+from bilayer_core.model.plate_strip import curved_stiffness, folds, swollen_curvature, swollen_curvature_across
+from bilayer_core.scene.config import Coupling, SceneConfig
 from bilayer_core.scene.profile import Profile
 from bilayer_core.scene.rod import Rod
 
 MOST = 0.01
 """Of curvature or stiffness at rest: difference from a beam above which `section: auto` is a strip."""
+PLATE = 0.05
+"""Likewise above which a beam is told to be wrong."""
 BROADEST = 100.0
 """w²κ/H up to which strips are asked whether they fold."""
 BISECTIONS = 20
+HELD = 0.2
+"""Part of a strip within one width from its clamps that counts."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +66,8 @@ def refusal(scene: SceneConfig, rod: Rod) -> str:
     if len(ratios) > 1:
         told = " and ".join(f"{ratio:g}" for ratio in ratios)
         return f"needs layers with one poisson_ratio, has {told}: unlike ones curl across by themselves"
+    if len({scene.materials[layer.material].retardation_time for layer in rod.layers}) > 1:
+        return "needs layers with one retardation_time"
     for layer in rod.layers:
         if layer.interval is not None:
             return f"needs layers that cover all of it, and {layer.name} has an `interval`"
@@ -77,6 +85,8 @@ def section_of(scene: SceneConfig, rod: Rod) -> str:
     """
     if rod.section != "auto":
         return rod.section
+    if scene.solver.model == "two_rod" or scene.coupling != Coupling():
+        return "beam"
     found = departure(rod, edge_figures(scene, rod))
     return "strip" if max(abs(found.of_curvature), found.of_stiffness) > MOST and not refusal(scene, rod) else "beam"
 
@@ -93,3 +103,77 @@ def folding_ratio(poisson: float) -> float:
         middle = 0.5 * (low + high)
         low, high = (low, middle) if folds(middle, poisson) else (middle, high)
     return high
+
+
+def plate_figures(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
+    """Yield how a strip as wide as a rod differs from a beam, and, of a strip, when it may fold and how high its
+    section rises.
+    """
+    where, found, strip = f"rods.{rod.name}", departure(rod, at_edges), section_of(scene, rod) == "strip"
+    change, stiffer = found.of_curvature, found.of_stiffness
+    if found.swollen > 0.0:
+        outside = (
+            "its section bends as well; that of a beam does not: give it `section: strip`, or, if its layers swell "
+            "along it alone, `swelling: along`"
+        )
+        yield Figure(
+            where,
+            f"a {'strip' if strip else 'plate'} as wide, swelling alike in all directions, "
+            f"{'curls' if strip else 'would curl'}",
+            f"{100 * abs(change):.2g} % {'less' if change < 0.0 else 'more'} than "
+            f"{'a beam' if strip else 'computed'} (w²κ/H {found.swollen:.2g})",
+            "computed so" if strip else f"at most {100 * PLATE:g} %",
+            abs(change) / PLATE,
+            outside if abs(change) > PLATE and not strip else "",
+        )
+    if found.curved > 0.0:
+        yield Figure(
+            where,
+            f"a {'strip' if strip else 'plate'} as wide and curved {'is' if strip else 'would be'} "
+            "stiffer in bending by",
+            f"{100 * stiffer:.2g} % (w²κ/H {found.curved:.2g})",
+            "computed so" if strip else f"at most {100 * PLATE:g} %",
+            stiffer / PLATE,
+            "its section keeps its shape; that of a beam bends freely" if stiffer > PLATE and not strip else "",
+        )
+    if strip and found.swollen > 0.0:
+        yield from _of_swollen_strip(scene, rod, at_edges, found.swollen)
+
+
+def _of_swollen_strip(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures, ratio: float) -> Iterator[Figure]:
+    where, poisson = f"rods.{rod.name}", at_edges.poisson_ratio
+    limit = folding_ratio(poisson)
+    strain = f" (an eigenstrain of {100 * float(at_edges.eigenstrain.max()) * limit / ratio:.3g} %)"
+    yield Figure(
+        where,
+        "as a strip it swells up to w²κ/H of",
+        f"{ratio:.3g}",
+        f"at most {limit:.3g}{strain if ratio > limit else ''}",
+        ratio / limit,
+        "beyond, held straighter it may fold in one place, as a tape spring does, and the mesh says where"
+        if ratio > limit
+        else "",
+    )
+    ratios = np.linspace(0.0, ratio, 101)[1:]  # rolled up across, κ̄ is all across
+    across = np.ones(100) if ratio > limit else swollen_curvature_across(ratios, poisson)
+    height = float((across * ratios).max() * at_edges.thickness.max() / 8.0)
+    if scene.contact is not None:
+        distance = scene.contact.barrier_distance
+        yield Figure(
+            where,
+            "its section rises by",
+            f"{1e3 * height:.3g} mm across",
+            f"at most {1e3 * distance:g} mm, the barrier distance",
+            height / distance,
+            "contact takes it as flat across" if height > distance else "",
+        )
+    held = sum(bool(end) for end in (rod.clamp_start, rod.clamp_end)) * float(at_edges.width.max()) / rod.path.length
+    if held > HELD:
+        yield Figure(
+            where,
+            "within one width from clamps, which keep its section flat, is",
+            f"{100 * held:.2g} % of it",
+            f"at most {100 * HELD:g} %",
+            held / HELD,
+            "a strip curls across up to its clamps",
+        )

@@ -105,9 +105,9 @@ class Rod(Part):
     """Cross-sections along the path, both ends included; the last one of a closed path is the first again."""
     layers: list[Layer] = Field(min_length=1, max_length=2)
     """Bottom first."""
-    section: Literal["beam", "strip"] = "beam"
+    section: Literal["beam", "strip", "auto"] = "beam"
     """`beam`: the section keeps its shape, right for w²κ/H below about 1; `strip`: it curls across the width, of any
-    width.
+    width; `auto`: `strip` where curvature or stiffness would differ by more than 1 %.
     """
     torsion: Literal["laminate", "layers"] = "laminate"
     """Torsional stiffness: of the bonded section, or the sum of the layers' own."""
@@ -348,19 +348,11 @@ def _sections(rod: Rod) -> Iterator[Fault]:
 
 
 def _faults_of_section(rod: Rod) -> Iterator[Fault]:
-    """Yield the faults of layers that a strip, or a beam, cannot have."""
+    """Yield the faults of layers that only a strip can have."""
     for index, layer in enumerate(rod.layers):
-        if rod.section == "beam":
-            if layer.swelling == "across":
-                demand = "must be isotropic or along: a beam does not feel it; `section: strip` of the rod does"
-                yield ("layers", index, "swelling"), layer.swelling, demand
-            continue
-        if layer.interval is not None:
-            demand = "must be left out: the layers of a strip (`section: strip`) cover all of it"
-            yield ("layers", index, "interval"), layer.interval, demand
-        for key in ("thickness", "stiffness"):
-            if isinstance(getattr(layer, key), Profile):
-                yield ("layers", index, key), "a profile", "must be the same all along a strip (`section: strip`)"
+        if layer.swelling == "across" and rod.section != "strip":
+            demand = "must be isotropic or along: a beam does not feel it; `section: strip` of the rod does"
+            yield ("layers", index, "swelling"), layer.swelling, demand
 
 
 LEAST_CLOSED = 5
