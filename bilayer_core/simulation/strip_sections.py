@@ -61,6 +61,23 @@ def curvatures(model: Model, state: State) -> tuple[Array, Array]:
     return (kappa / length)[inside][nearest], (curved / length)[inside][nearest]
 
 
+def across_at_nodes(model: Model, state: State) -> Array:
+    """Return the mean curvature across of strips at all nodes [1/m], 0 at those of beams, shape (n_node,)."""
+    found = np.zeros(model.node_count)
+    if not model.flattening.exists:
+        return found
+    across, rods, joint = curvatures(model, state)[1], model.rods, model.flattening.joint
+    inner = np.maximum(np.where(rods.joint_a < rods.edge_count, rods.joint_a, -1), rods.joint_b)[joint]
+    inner = np.where(inner < rods.edge_count, inner, np.minimum(rods.joint_a, rods.joint_b)[joint])
+    for strand in model.strands:
+        own = _joints_of(model, strand)
+        if len(own):
+            nodes = np.arange(strand.first_node, strand.first_node + strand.node_count)
+            places = rods.edge_node[inner[own]]
+            found[nodes] = across[own][np.abs(nodes[:, None] - places).argmin(axis=1)]
+    return found
+
+
 def _joints_of(model: Model, strand: StrandArrays) -> Array:
     """Return which strip joints belong to a strand."""
     edges, strips = model.rods, model.flattening
