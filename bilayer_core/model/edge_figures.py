@@ -37,7 +37,7 @@ class EdgeFigures:
     width, thickness : ndarray
         Of the whole section [m], shape (n_edge,).
     eigenstrain : ndarray
-        Largest magnitude in each layer over its channels' ranges, shape (n_layer, n_edge).
+        Largest magnitude along the path in each layer over its channels' ranges, shape (n_layer, n_edge).
     eigenstrain_range : ndarray
         Least and largest, likewise, shape (2, n_layer, n_edge).
     poisson_ratio : float
@@ -58,6 +58,8 @@ class EdgeFigures:
             material = scene.materials[layer.material]
             self._moduli[index] = stiffness * material.youngs_modulus
             self._shear_moduli[index] = self._moduli[index] / (2.0 * (1.0 + material.poisson_ratio))
+            if layer.swelling == "across":
+                continue
             of_copies = dict.fromkeys(tuple(variant.layers[index].eigenstrain) for variant in rod.variants)
             ranges = np.array([_eigenstrain_range(scene, rod, layer, laws) for laws in of_copies])
             self.eigenstrain[index] = ranges[:, 0].max(axis=0)

@@ -323,13 +323,13 @@ def _add_eigenstrain(
             groups = [(found.law(scene, law), with_copies(rod, edges))]
         for number, driven in groups:
             weight, bend = whole.driven(part, covered & np.isin(cells.edge, driven))
-            weight = weight[:, driven]
+            weight = weight[:, driven] if layer.swelling != "across" else np.zeros_like(weight[:, driven])
             of_edges.append((first_edge + driven, np.full(weight.shape, number), weight))
             bent = (bend != 0.0) & (joints >= 0)
             if strip and layer.swelling != "along":
                 found.add(curled_joint=joints[bent], curled_law=np.full(bent.sum(), number), curled_weight=bend[bent])
             if layer.swelling == "across":
-                weight, bent = 0.0 * weight, np.zeros_like(bent)
+                bent = np.zeros_like(bent)
             copy, _ = np.nonzero(bent)
             of_joints.append((copy, joints[bent], np.full(len(copy), number), bend[bent]))
     if not of_edges:

@@ -121,6 +121,17 @@ def test_fibres_leave_the_curvature_along_at_that_of_a_narrow_strip(swelling, wa
     assert swollen(6.0, 0.3, swelling)[1] == pytest.approx(np.full(11, wanted), abs=1e-9)
 
 
+def test_layers_that_swell_across_make_a_strip_no_longer():
+    content = wide("across")
+    content["stimuli"]["humidity"]["schedule"]["value"] = 1.0
+    content["rods"][0]["layers"][0]["swelling"] = content["rods"][0]["layers"][1]["swelling"] = "across"
+    simulator = Simulator(load_scene(content), model="laminate")
+    simulator.solve_static()
+    assert simulator.positions[-1] == pytest.approx([6.6e-3, 0.0, 0.0], abs=1e-12)
+    across = simulator.rods["rod"].curvature_across
+    assert (across < -1.0).all() and across == pytest.approx(np.full(7, across[3]))
+
+
 @pytest.mark.parametrize("swelling", ["isotropic", "across"])
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_the_work_of_a_stimulus_on_a_strip_is_what_it_gains(swelling, dimension):
