@@ -42,7 +42,7 @@ from bilayer_core.engine.kinetic import kinetic_energy
 from bilayer_core.engine.laws import eigenstrain_of
 from bilayer_core.engine.powers import BY_FLOW, in_barriers, write_forces_of_laws
 from bilayer_core.forces.added_mass import fluid_momentum, move_fluid
-from bilayer_core.forces.flattening import pull_of_rest, share_of_rest
+from bilayer_core.forces.flattening import pull_of_change, pull_of_rest
 from bilayer_core.forces.inertia import second_moment_beyond
 from bilayer_core.forces.raised import inertia_off_curve
 from bilayer_core.jit import kernel, piece, record_at
@@ -177,6 +177,8 @@ def _supply_by_jumps(p, state, inputs, work):
     for k in range(drives.driven_joint.shape[0]):
         j, strained = drives.driven_joint[k], work.strain[drives.driven_joint_law[k]]
         stage.rest_joint[j, 0] += drives.driven_joint_weight[k] * strained
+    if p.flattening.exists:
+        pull_of_change(p.flattening, stage.rest_joint)
     for k in range(drives.driven_edge.shape[0]):
         e = drives.driven_edge[k]
         force = strands.axial_stiffness[e] * stage.rest_edge[e] * strands.rest_length[e]
@@ -184,11 +186,7 @@ def _supply_by_jumps(p, state, inputs, work):
     for k in range(drives.driven_joint.shape[0]):
         j = drives.driven_joint[k]
         if p.flattening.exists:
-            i, share = share_of_rest(p.flattening, j)
-            if i >= 0:
-                bent, along = stage.rest_joint[p.flattening.first + i, 0], stage.rest_joint[p.flattening.joint[i], 0]
-                pull = share * p.flattening.pull[i, 1] * (bent + p.flattening.poisson[i] * along)
-                work.start_force[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * pull
+            work.start_force[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * p.flattening.pull[j]
             if j >= p.flattening.first:
                 continue
         moment = strands.joint_stiffness[j, 0] * stage.rest_joint[j, 0]

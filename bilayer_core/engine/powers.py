@@ -5,7 +5,7 @@ from __future__ import annotations
 from bilayer_core.contact.barrier import barrier_gradient
 from bilayer_core.contact.near import gap_normal, place_of
 from bilayer_core.forces.bend_twist import bend_by_strains
-from bilayer_core.forces.flattening import pull_of_rest, share_of_rest
+from bilayer_core.forces.flattening import pull_of_rest
 from bilayer_core.forces.rail_arms import write_rail_motions
 from bilayer_core.forces.rod_arms import add_step_of_arm, write_material_rate
 from bilayer_core.forces.rod_contact import moved_between
@@ -40,10 +40,7 @@ def write_forces_of_laws(p, at, stage, force_out):
     for k in range(drives.driven_joint.shape[0]):
         j = drives.driven_joint[k]
         if p.flattening.exists:
-            i, share = share_of_rest(p.flattening, j)
-            if i >= 0:
-                pull = share * p.flattening.pull[i, 0]
-                force_out[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * pull
+            force_out[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * p.flattening.pull[j]
             if j >= p.flattening.first:
                 continue
         a, b = strands.joint_a[j], strands.joint_b[j]

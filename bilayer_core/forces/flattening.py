@@ -120,27 +120,32 @@ def flattening_law(flattening, rest, i, kappa, theta):
 
 @kernel
 def pull_of_rest(p, at, stage):
-    """Write the first and second derivative of F by κ̄y Δl of each strip joint at a configuration as it is."""
+    """Write ∂F/∂ of each row of `Stage.rest_joint`, and the second derivative by κ̄y Δl of each strip joint, at a
+    configuration as it is.
+    """
     strands, flattening = p.strands, p.flattening
     for i in range(flattening.joint.shape[0]):
         k = flattening.joint[i]
         ka, kb = strands.joint_a[k], strands.joint_b[k]
         a, b, m1a, m1b = row(at.tangent, ka), row(at.tangent, kb), row(at.director1, ka), row(at.director1, kb)
         ic, p1, q1 = 1.0 / (1.0 + dot(a, b)), dot(b, m1a), dot(a, m1b)
-        theta = angle(
-            dot(m1a, m1b) - p1 * q1 * ic, dot(row(at.director2, ka), m1b) - dot(b, row(at.director2, ka)) * q1 * ic
-        )
-        theta += TWO_PI * math.floor((at.joint_strain[k, 2] - theta) / TWO_PI + 0.5)
-        _, _, _, _, _, _, flattening.pull[i, 0], flattening.pull[i, 1] = flattening_law(
-            flattening, stage.rest_joint, i, (p1 - q1) * ic, theta
-        )
+        theta = 0.0
+        if p.space.exists:
+            m2a = row(at.director2, ka)
+            theta = angle(dot(m1a, m1b) - p1 * q1 * ic, dot(m2a, m1b) - dot(b, m2a) * q1 * ic)
+            theta += TWO_PI * math.floor((at.joint_strain[k, 2] - theta) / TWO_PI + 0.5)
+        _, _, _, _, _, _, pull, slope = flattening_law(flattening, stage.rest_joint, i, (p1 - q1) * ic, theta)
+        flattening.pull[flattening.first + i], flattening.pull[k] = pull, flattening.poisson[i] * pull
+        flattening.slope[i] = slope
 
 
 @kernel
-def share_of_rest(flattening, j):
-    """Return which strip joint row j of `Stage.rest_joint` strains, −1 if none, and its part in κ̄y Δl + ν κ̄₁."""
-    i = flattening.of_rest[j]
-    return i, 1.0 if j >= flattening.first else (flattening.poisson[i] if i >= 0 else 0.0)
+def pull_of_change(flattening, change):
+    """Replace ∂F/∂ of rows of `Stage.rest_joint` by what it gains with a change of these."""
+    for i in range(flattening.joint.shape[0]):
+        k, nu = flattening.joint[i], flattening.poisson[i]
+        pull = flattening.slope[i] * (change[flattening.first + i, 0] + nu * change[k, 0])
+        flattening.pull[flattening.first + i], flattening.pull[k] = pull, nu * pull
 
 
 @kernel

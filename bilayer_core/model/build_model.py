@@ -190,8 +190,6 @@ def _flattening(found: Collected, rods: Strands) -> Flattening:
     edges = np.where(edges < rods.edge_count, edges, edges[:, ::-1])
     width, axial = 2.0 * rods.half_width[edges].mean(axis=1), rods.axial_stiffness[edges].mean(axis=1)
     stiffness = 0.25 * width**4 * axial / found.column("voronoi_length")[joint] ** 3
-    of_rest = np.concatenate([np.full(count, -1), np.arange(len(joint))])
-    of_rest[joint] = np.arange(len(joint))
     return Flattening.zeros(
         UNALLOCATED,
         first=count,
@@ -199,7 +197,6 @@ def _flattening(found: Collected, rods: Strands) -> Flattening:
         poisson=poisson,
         stiffness=stiffness,
         scale=stiffness * (1.0 - poisson**2) / rods.joint_stiffness[joint, 0],
-        of_rest=of_rest,
     )
 
 

@@ -127,7 +127,7 @@ def test_layers_that_swell_across_make_a_strip_no_longer():
     content["rods"][0]["layers"][0]["swelling"] = content["rods"][0]["layers"][1]["swelling"] = "across"
     simulator = Simulator(load_scene(content), model="laminate")
     simulator.solve_static()
-    assert simulator.positions[-1] == pytest.approx([6.6e-3, 0.0, 0.0], abs=1e-12)
+    assert simulator.positions[-1, :2] == pytest.approx([6.6e-3, 0.0], abs=1e-12)
     across = simulator.rods["rod"].curvature_across
     assert (across < -1.0).all() and across == pytest.approx(np.full(7, across[3]))
 

@@ -104,8 +104,8 @@ class Flattening:
     poisson: Vector  # ν, likewise
     stiffness: Vector  # s = w⁴ EA/(4 Δl³) [N m], likewise
     scale: Vector  # Λ, likewise
-    of_rest: Indices  # strip joint of each row of `Stage.rest_joint`, −1 without one
-    pull: Matrix = ("strip joint", 2)  # first and second derivative of the energy by κ̄y Δl [N m]
+    pull: Vector = ("joint rest",)  # derivative of the energy by each row of `Stage.rest_joint` [N m]
+    slope: Vector = ("strip joint",)  # second derivative by κ̄y Δl [N m]
 
 
 @record
