@@ -38,6 +38,8 @@ class EdgeFigures:
         Of the whole section [m], shape (n_edge,).
     eigenstrain : ndarray
         Largest magnitude along the path in each layer over its channels' ranges, shape (n_layer, n_edge).
+    eigenstrain_across : ndarray
+        Likewise across the path.
     eigenstrain_range : ndarray
         Least and largest, likewise, shape (2, n_layer, n_edge).
     poisson_ratio : float
@@ -51,17 +53,19 @@ class EdgeFigures:
         if rod.radius is not None:
             self._hole = 2.0 * values_at(rod.inner_radius, rod.edge_length * stations) / self.width
         self._moduli, self._shear_moduli = np.zeros_like(self._layers), np.zeros_like(self._layers)
-        self.eigenstrain = np.zeros_like(self._layers)
+        self.eigenstrain, self.eigenstrain_across = np.zeros_like(self._layers), np.zeros_like(self._layers)
         self.eigenstrain_range = np.zeros((2, *self._layers.shape))
         for index, layer in enumerate(rod.layers):
             stiffness = values_at(layer.stiffness, rod.edge_length * stations)
             material = scene.materials[layer.material]
             self._moduli[index] = stiffness * material.youngs_modulus
             self._shear_moduli[index] = self._moduli[index] / (2.0 * (1.0 + material.poisson_ratio))
-            if layer.swelling == "across":
-                continue
             of_copies = dict.fromkeys(tuple(variant.layers[index].eigenstrain) for variant in rod.variants)
             ranges = np.array([_eigenstrain_range(scene, rod, layer, laws) for laws in of_copies])
+            if layer.swelling != "along":
+                self.eigenstrain_across[index] = ranges[:, 0].max(axis=0)
+            if layer.swelling == "across":
+                continue
             self.eigenstrain[index] = ranges[:, 0].max(axis=0)
             self.eigenstrain_range[:, index] = ranges[:, 1].min(axis=0), ranges[:, 2].max(axis=0)
         self.thickness = self._layers.sum(axis=0)
@@ -98,18 +102,19 @@ class EdgeFigures:
             both = both + axial[0] * axial[1] / axial.sum(axis=0) * (0.5 * self.thickness) ** 2
         return (own * (self._natural - self._path)).sum(axis=0) / both
 
-    def free_curvature(self) -> np.ndarray:
-        """Return the most that eigenstrains add to the curvature without loads [1/m], shape (n_edge,).
+    def free_curvature(self, across: bool = False) -> np.ndarray:
+        """Return the most that eigenstrains add to the curvature without loads [1/m], along the path or, of a free
+        plate, across, shape (n_edge,).
 
         It follows Timoshenko's formula, and is 0 where there is one layer.
         """
-        curvature = np.zeros(len(self.width))
+        curvature, eigenstrain = np.zeros(len(self.width)), self.eigenstrain_across if across else self.eigenstrain
         both = (self._layers > 0.0).all(axis=0) & (len(self._layers) == 2)
         if both.any():
             (bottom, top), moduli = self._layers[:, both], self._moduli[:, both]
             m, n = moduli[0] / moduli[1], bottom / top
             shape = 6.0 * (1.0 + n) ** 2 / (3.0 * (1.0 + n) ** 2 + (1.0 + m * n) * (n**2 + 1.0 / (m * n)))
-            curvature[both] = shape * self.eigenstrain[:, both].sum(axis=0) / (bottom + top)
+            curvature[both] = shape * eigenstrain[:, both].sum(axis=0) / (bottom + top)
         return curvature
 
     def shear_over_bending(self) -> np.ndarray:

@@ -136,37 +136,13 @@ def plate_figures(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterat
             stiffer / PLATE,
             "its section keeps its shape; that of a beam bends freely" if stiffer > PLATE and not strip else "",
         )
-    if strip and found.swollen > 0.0:
-        yield from _of_swollen_strip(scene, rod, at_edges, found.swollen)
-
-
-def _of_swollen_strip(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures, ratio: float) -> Iterator[Figure]:
-    where, poisson = f"rods.{rod.name}", at_edges.poisson_ratio
-    limit = folding_ratio(poisson)
-    strain = f" (an eigenstrain of {100 * float(at_edges.eigenstrain.max()) * limit / ratio:.3g} %)"
-    yield Figure(
-        where,
-        "as a strip it swells up to w²κ/H of",
-        f"{ratio:.3g}",
-        f"at most {limit:.3g}{strain if ratio > limit else ''}",
-        ratio / limit,
-        "beyond, held straighter it may fold in one place, as a tape spring does, and the mesh says where"
-        if ratio > limit
-        else "",
-    )
-    ratios = np.linspace(0.0, ratio, 101)[1:]  # rolled up across, κ̄ is all across
-    across = np.ones(100) if ratio > limit else swollen_curvature_across(ratios, poisson)
-    height = float((across * ratios).max() * at_edges.thickness.max() / 8.0)
+    if not strip:
+        return
+    limit = folding_ratio(at_edges.poisson_ratio)
+    if found.swollen > 0.0:
+        yield _of_folds(where, at_edges, found.swollen, limit)
     if scene.contact is not None:
-        distance = scene.contact.barrier_distance
-        yield Figure(
-            where,
-            "its section rises by",
-            f"{1e3 * height:.3g} mm across",
-            f"at most {1e3 * distance:g} mm, the barrier distance",
-            height / distance,
-            "contact takes it as flat across" if height > distance else "",
-        )
+        yield from _of_height(where, at_edges, found.swollen, limit, scene.contact.barrier_distance)
     held = sum(bool(end) for end in (rod.clamp_start, rod.clamp_end)) * float(at_edges.width.max()) / rod.path.length
     if held > HELD:
         yield Figure(
@@ -176,4 +152,35 @@ def _of_swollen_strip(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures, ratio
             f"at most {100 * HELD:g} %",
             held / HELD,
             "a strip curls across up to its clamps",
+        )
+
+
+def _of_folds(where: str, at_edges: EdgeFigures, ratio: float, limit: float) -> Figure:
+    strain = f" (an eigenstrain of {100 * float(at_edges.eigenstrain.max()) * limit / ratio:.3g} %)"
+    return Figure(
+        where,
+        "as a strip it swells up to w²κ/H of",
+        f"{ratio:.3g}",
+        f"at most {limit:.3g}{strain if ratio > limit else ''}",
+        ratio / limit,
+        "beyond, held straighter it may fold in one place, as a tape spring does, and the mesh says where"
+        if ratio > limit
+        else "",
+    )
+
+
+def _of_height(where: str, at_edges: EdgeFigures, ratio: float, limit: float, distance: float) -> Iterator[Figure]:
+    """Yield the height of a section, κ_y w²/8, of that in which κ̄y is largest."""
+    free = float((at_edges.free_curvature(across=True) * at_edges.width**2).max()) / 8.0
+    if 0.0 < ratio <= limit:  # beyond it may roll up across, where κ̄y is all there is
+        ratios = np.linspace(0.0, ratio, 101)[1:]
+        free *= float((swollen_curvature_across(ratios, at_edges.poisson_ratio) * ratios).max()) / ratio
+    if free > 0.0:
+        yield Figure(
+            where,
+            "its section rises by",
+            f"{1e3 * free:.3g} mm across",
+            f"at most {1e3 * distance:g} mm, the barrier distance",
+            free / distance,
+            "contact takes it as flat across" if free > distance else "",
         )

@@ -64,16 +64,15 @@ def _of_section(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterator
             "the law of the material is linear" if strain > LARGE_STRAIN else "",
         )
     bend = max((curvature * thickness).max(), at_edges.bend_of_layers().max())
-    if bend == 0.0:
-        return
-    yield Figure(
-        where,
-        "curvature × thickness up to",
-        f"{bend:.2g}",
-        f"at most {THICK_CURVATURE:g}",
-        bend / THICK_CURVATURE,
-        "it is no thin rod" if bend > THICK_CURVATURE else "",
-    )
+    if bend > 0.0:
+        yield Figure(
+            where,
+            "curvature × thickness up to",
+            f"{bend:.2g}",
+            f"at most {THICK_CURVATURE:g}",
+            bend / THICK_CURVATURE,
+            "it is no thin rod" if bend > THICK_CURVATURE else "",
+        )
     yield from plate_figures(scene, rod, at_edges)
 
 

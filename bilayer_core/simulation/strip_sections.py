@@ -12,6 +12,8 @@ the one reaches depends on the mesh, since the law of a joint knows nothing of t
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from bilayer_core.forces.flattening import flatness
@@ -121,3 +123,13 @@ def shapes(model: Model, state: State) -> dict[str, str]:
         else:
             found[strand.rod] = "curled along"
     return found
+
+
+def folded(model: Model, state: State) -> Iterator[str]:
+    """Yield a warning for each strip that has folded."""
+    for name, shape in shapes(model, state).items():
+        if shape == "folded":
+            yield (
+                f"rods.{name} has folded: a part of it curls along and a part rolls up across, and where depends on "
+                "the mesh; a slower stimulus, or a strip that is less wide, does not fold"
+            )

@@ -10,6 +10,7 @@ from support.sample_scenes import GEL, fixed, layer, rod, scene
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SceneError, SimulationError
 from bilayer_core.forces.flattening import SERIES, flatness
+from bilayer_core.simulation.strip_sections import folded
 
 TABLE = {
     0.3: {0.5: 0.997, 1.0: 0.989, 2.6: 0.941, 3.0: 0.927, 4.3: 0.888, 6.0: 0.863, 10.0: 0.974, 20.0: 1.141}
@@ -114,6 +115,24 @@ def test_a_strip_held_flat_in_a_plane_rolls_up_across_where_only_twist_leads_on(
 def test_a_strip_that_folds_at_rest_is_refused_since_the_mesh_would_say_where():
     with pytest.raises(SimulationError, match=r"rods\.rod folds: .* raise its stimulus in steps"):
         swollen(100.0, 0.5, dimension=2, values=(0.1, 0.2, 0.3))
+
+
+def test_a_run_warns_of_a_strip_of_which_a_part_curls_along_and_a_part_across():
+    curvature = 36.0 * THICKNESS / WIDTH**2
+    law = {"stimulus": "heat", "gain": curvature * THICKNESS / 1.5}
+    half = {"thickness": 0.5 * THICKNESS}
+    layers = [layer("bottom", eigenstrain=law, **half), layer("top", **half)]
+    heat = {"heat": {"schedule": {"type": "hold", "value": 1}}}
+    strip = rod(layers, length=0.2, stations=21, width=WIDTH) | {"section": "strip"}
+    simulator = Simulator(load_scene(scene([strip], stimuli=heat)), model="laminate")
+    assert list(folded(simulator.model, simulator._state)) == []  # flat: all of it rolls up across
+    angle = np.repeat([0.0, 1.3 * curvature * 0.01], 10) * np.arange(20)
+    turned = np.stack([np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1)
+    simulator._state.position[1:] = simulator._state.position[0] + np.cumsum(0.01 * turned, axis=0)
+    simulator._state.director1[:] = turned[:, [2, 1, 0]] * [-1.0, 0.0, 1.0]
+    (warning,) = folded(simulator.model, simulator._state)
+    assert "rods.rod has folded" in warning
+    assert warning in simulator.summary()["warnings"]
 
 
 @pytest.mark.parametrize(("swelling", "wanted"), [("along", 1.0), ("across", 0.0)])

@@ -52,6 +52,15 @@ def test_check_says_by_how_much_a_strip_differs_when_it_folds_and_how_high_its_s
     assert departure(loaded.rods[0], edge_figures(loaded, loaded.rods[0])).swollen == pytest.approx(36.0, rel=1e-3)
 
 
+def test_the_height_of_a_section_is_what_layers_that_swell_across_make_of_it():
+    around = {"contact": contact(2e-4), "obstacles": [GROUND | {"point": [0, 0, -1]}]}
+    heights = {}
+    for swelling, gain in (("across", 0.006667), ("along", 0.006667), ("isotropic", 0.0006667)):
+        told = validity_figures(load_scene(wide("strip", swelling=swelling, gain=gain, **around)))
+        heights[swelling] = [figure.value for figure in told if figure.what == "its section rises by"]
+    assert heights == {"across": ["2.25 mm across"], "along": [], "isotropic": ["0.205 mm across"]}
+
+
 def test_the_width_from_which_on_strips_fold_is_that_of_the_plate():
     assert folding_ratio(0.5) == pytest.approx(8.7, abs=0.1)
     assert folding_ratio(0.3) == pytest.approx(10.7, abs=0.1)
