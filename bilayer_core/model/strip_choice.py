@@ -62,6 +62,8 @@ def departure(rod: Rod, at_edges: EdgeFigures) -> Departure:
 
 def refusal(scene: SceneConfig, rod: Rod) -> str:
     """Return why a rod of the laminate cannot be a strip; empty if it can."""
+    if rod.radius is not None:
+        return "needs a rectangular section, and it is round"
     ratios = sorted({scene.materials[layer.material].poisson_ratio for layer in rod.layers})
     if len(ratios) > 1:
         told = " and ".join(f"{ratio:g}" for ratio in ratios)
@@ -87,6 +89,8 @@ def section_of(scene: SceneConfig, rod: Rod) -> str:
         return rod.section
     if scene.solver.model == "two_rod" or scene.coupling != Coupling():
         return "beam"
+    if rod.radius is not None:
+        return "beam"
     found = departure(rod, edge_figures(scene, rod))
     return "strip" if max(abs(found.of_curvature), found.of_stiffness) > MOST and not refusal(scene, rod) else "beam"
 
@@ -109,6 +113,8 @@ def plate_figures(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterat
     """Yield how a strip as wide as a rod differs from a beam, and, of a strip, when it may fold and how high its
     section rises.
     """
+    if rod.radius is not None:
+        return
     where, found, strip = f"rods.{rod.name}", departure(rod, at_edges), section_of(scene, rod) == "strip"
     change, stiffer = found.of_curvature, found.of_stiffness
     if found.swollen > 0.0:

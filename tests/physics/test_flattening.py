@@ -147,7 +147,7 @@ def test_layers_that_swell_across_make_a_strip_no_longer():
     simulator = Simulator(load_scene(content), model="laminate")
     simulator.solve_static()
     assert simulator.positions[-1, :2] == pytest.approx([6.6e-3, 0.0], abs=1e-12)
-    across = simulator.rods["rod"].curvature_across
+    across = simulator.rods["rod"].section_curvature
     assert (across < -1.0).all() and across == pytest.approx(np.full(7, across[3]))
 
 

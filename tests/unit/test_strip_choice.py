@@ -82,6 +82,15 @@ def test_a_strip_that_cannot_be_computed_is_refused_with_the_reason(more, reason
         Simulator(load_scene(wide("strip", more=more)))
 
 
+def test_round_rods_are_no_strips():
+    tube = {**rod([layer()], section="strip", radius=1e-3), "width": None}
+    tube["layers"][0]["thickness"] = None
+    with pytest.raises(SceneError, match="needs a rectangular section, and it is round; allowed: beam"):
+        Simulator(load_scene(scene([tube], {"model": "auto"})))
+    loaded = load_scene(scene([tube | {"section": "auto"}]))
+    assert section_of(loaded, loaded.rods[0]) == "beam"
+
+
 def test_two_rods_cannot_be_strips():
     with pytest.raises(SceneError, match="no part across the width; allowed: laminate"):
         Simulator(load_scene(wide("strip")), model="two_rod")

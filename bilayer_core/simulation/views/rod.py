@@ -35,7 +35,7 @@ class RodView:
         Axial strain at each node, eigenstrain included, shape (nodes,).
     curvature : Array
         Curvature χ through the thickness at each node [1/m], shape (nodes,).
-    curvature_across : Array
+    section_curvature : Array
         Mean curvature of the section across the width at each node [1/m], positive where the borders rise along m1,
         shape (nodes,); 0 in a beam. The section rises by about an eighth of it times the width squared.
     contact_forces : Array
@@ -86,7 +86,7 @@ class RodView:
         return self._present.seen().curvature[self.nodes]
 
     @property
-    def curvature_across(self) -> Array:
+    def section_curvature(self) -> Array:
         return across_at_nodes(self._present.model, self._present.state)[self.nodes]
 
     @property
