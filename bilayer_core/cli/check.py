@@ -88,8 +88,8 @@ def _report(simulator) -> dict[str, Any]:
 
 def _parts(scene) -> dict[str, list[str]]:
     """Return descriptions of the parts of the robot and of its surroundings, by name."""
+    from bilayer_core.model.edge_figures import edge_figures
     from bilayer_core.model.findings import few
-    from bilayer_core.model.validity import edge_figures
     from bilayer_core.scene.mechanism import resistance
     from bilayer_core.scene.profile import extremes
 

@@ -42,9 +42,10 @@ from bilayer_core.engine.kinetic import kinetic_energy
 from bilayer_core.engine.laws import write_strains_of_laws
 from bilayer_core.engine.powers import BY_FLOW, in_barriers, write_forces_of_laws
 from bilayer_core.forces.added_mass import fluid_momentum, move_fluid
+from bilayer_core.forces.flattening import pull_of_change, pull_of_rest
 from bilayer_core.forces.inertia import second_moment_beyond
 from bilayer_core.forces.raised import inertia_off_curve
-from bilayer_core.jit import kernel, piece
+from bilayer_core.jit import kernel, piece, record_at
 from bilayer_core.jit.called import stack_matrix
 from bilayer_core.kinematics.copying import copy
 from bilayer_core.kinematics.vector import row
@@ -54,6 +55,7 @@ from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Stage, StageInputs, StateArrays, Work
 
+configuration_at = record_at(Configuration)
 ENERGY, IN_BARRIERS, POWER_SUPPLIED, POWER_LOST, POWER_BARRIER, POWER_DAMPING = range(6)
 FREE, LOWEST, LARGEST, NUMERICAL, GRAVITY_AT_START, OPEN, MADE, UNSURE = range(6, 14)
 """Slots of `State.account`: T + V, and the part of V in barriers [J]; powers at the end of the last step, and of what
@@ -167,18 +169,26 @@ def _supply_by_jumps(p, state, inputs, work):
     write_strains_of_laws(drives, work.transduction, work.strain)
     for i in range(work.start_strain.shape[0]):
         work.strain[i] -= work.start_strain[i]
+    if p.flattening.exists:
+        pull_of_rest(p, configuration_at(work.configurations[0]), stage)
     stage.rest_edge[:], stage.rest_joint[:, 0] = 0.0, 0.0  # scratch until a stage begins
     for k in range(drives.driven_edge.shape[0]):
         stage.rest_edge[drives.driven_edge[k]] += drives.driven_weight[k] * work.strain[drives.driven_law[k]]
     for k in range(drives.driven_joint.shape[0]):
         j, strained = drives.driven_joint[k], work.strain[drives.driven_joint_law[k]]
         stage.rest_joint[j, 0] += drives.driven_joint_weight[k] * strained
+    if p.flattening.exists:
+        pull_of_change(p.flattening, stage.rest_joint)
     for k in range(drives.driven_edge.shape[0]):
         e = drives.driven_edge[k]
         force = strands.axial_stiffness[e] * stage.rest_edge[e] * strands.rest_length[e]
         work.start_force[drives.driven_law[k]] -= drives.driven_weight[k] * force
     for k in range(drives.driven_joint.shape[0]):
         j = drives.driven_joint[k]
+        if p.flattening.exists:
+            work.start_force[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * p.flattening.pull[j]
+            if j >= p.flattening.first:
+                continue
         moment = strands.joint_stiffness[j, 0] * stage.rest_joint[j, 0]
         work.start_force[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * moment
     for i in range(work.start_strain.shape[0]):

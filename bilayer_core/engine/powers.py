@@ -5,6 +5,7 @@ from __future__ import annotations
 from bilayer_core.contact.barrier import barrier_gradient
 from bilayer_core.contact.near import gap_normal, place_of
 from bilayer_core.forces.bend_twist import bend_by_strains
+from bilayer_core.forces.flattening import pull_of_rest
 from bilayer_core.forces.rail_arms import write_rail_motions
 from bilayer_core.forces.rod_arms import add_step_of_arm, write_material_rate
 from bilayer_core.forces.rod_contact import moved_between
@@ -34,8 +35,14 @@ def write_forces_of_laws(p, at, stage, force_out):
     bends = drives.driven_joint.shape[0] > 0 and off_axis.exists
     if bends:
         bend_by_strains(off_axis, strands, at, stage.rest_joint)
+    if p.flattening.exists:
+        pull_of_rest(p, at, stage)
     for k in range(drives.driven_joint.shape[0]):
         j = drives.driven_joint[k]
+        if p.flattening.exists:
+            force_out[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * p.flattening.pull[j]
+            if j >= p.flattening.first:
+                continue
         a, b = strands.joint_a[j], strands.joint_b[j]
         t, u = row(at.tangent, a), row(at.tangent, b)
         bend = (dot(u, row(at.director1, a)) - dot(t, row(at.director1, b))) / (1.0 + dot(t, u))

@@ -18,6 +18,7 @@ from bilayer_core.forces.body_drag import add_body_drag, body_flow_of
 from bilayer_core.forces.bond import add_bonds
 from bilayer_core.forces.drag import add_drag, update_directions_of_drag
 from bilayer_core.forces.elements import start_elements
+from bilayer_core.forces.flattening import add_flattening, add_flattening_in_plane
 from bilayer_core.forces.gyroscopic import add_gyroscopic_force, spinning_of, update_gyroscopic_force
 from bilayer_core.forces.inertia import add_inertial_forces
 from bilayer_core.forces.joints import add_joints, joints_of
@@ -95,6 +96,8 @@ TERMS: tuple[Term, ...] = (
     Term(("bending", "twisting"), lambda model, of: of["space"], add_bending),
     Term(("bond",), lambda model, of: of["space"], add_bonds),
     Term(("stretching", "bending", "bond"), lambda model, of: of["plane"], add_elasticity_in_plane),
+    Term(("flattening",), lambda model, of: of["space"], add_flattening),
+    Term(("flattening",), lambda model, of: of["plane"], add_flattening_in_plane),
     Term(("joints",), lambda model, of: joints_of(model), add_joints),
     Term(
         ("joints", "joint friction"),

@@ -26,6 +26,7 @@ from bilayer_core.model.records.parts import (
     Bonds,
     Constrained,
     Drives,
+    Flattening,
     Joins,
     OffAxis,
     Plane,
@@ -85,6 +86,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         varied_fields=build_varied_fields(scene, found, drives),
         light=build_light(scene, found, placed, rods, drives),
         plane=Plane.absent() if plane is None else _plane(plane, found, placed, rods),
+        flattening=_flattening(found, rods),
         off_axis=OffAxis.absent() if bonds.exists else _off_axis(found, rods, strain_coupling),
         bonds=bonds,
         raised=raised,
@@ -164,13 +166,17 @@ def _drives(found: Collected) -> Drives:
     rising, falling = np.concatenate([np.zeros((0, 2)), *lags]).T.copy()
     weights = [weight for _, weight, *_ in found.laws]
     numbers = np.array([own[2:] for own in found.laws], dtype=float).reshape(-1, 3).T.copy()
+    rest, strips = _of_joints(found, "joint_rest", width=3), found.column("strip_joint", np.int64)
+    curled = len(rest) + np.searchsorted(strips, found.column("curled_joint", np.int64))
     return Drives(
         rest_strain=found.column("rest_strain"),
-        joint_rest=_of_joints(found, "joint_rest", width=3),
-        **{
-            f"driven_{name}": found.column(f"driven_{name}", np.int64) for name in ("edge", "law", "joint", "joint_law")
-        },
-        **{f"driven_{name}": found.column(f"driven_{name}") for name in ("weight", "joint_weight")},
+        joint_rest=np.concatenate([rest, np.zeros((len(strips), 3))]),
+        driven_edge=found.column("driven_edge", np.int64),
+        driven_law=found.column("driven_law", np.int64),
+        driven_weight=found.column("driven_weight"),
+        driven_joint=np.concatenate([found.column("driven_joint", np.int64), curled]),
+        driven_joint_law=_both(found, "driven_joint_law", "curled_law", np.int64),
+        driven_joint_weight=_both(found, "driven_joint_weight", "curled_weight"),
         field_channel=np.array([channel for channel, *_ in found.fields], dtype=np.int64),
         field_first=first.astype(np.int64),
         field_slowest=first[:-1] + np.array([of.max(axis=1).argmax() for of in lags], dtype=np.int64),
@@ -180,6 +186,29 @@ def _drives(found: Collected) -> Drives:
         law_first=np.cumsum([0, *map(len, weights)]).astype(np.int64),
         law_weight=np.array([part for weight in weights for part in weight], dtype=float),
         **dict(zip(("law_gain", "law_reference", "law_saturation"), numbers, strict=True)),
+    )
+
+
+def _both(found: Collected, first: str, second: str, dtype: type = float) -> np.ndarray:
+    return np.concatenate([found.column(name, dtype) for name in (first, second)])
+
+
+def _flattening(found: Collected, rods: Strands) -> Flattening:
+    """Return the joints of strips, in order; a clamp edge is as wide and stiff as the edge that it holds."""
+    joint, poisson, count = found.column("strip_joint", np.int64), found.column("strip_poisson"), len(rods.joint_a)
+    if not len(joint):
+        return Flattening.absent()
+    edges = np.stack([rods.joint_a, rods.joint_b], axis=1)[joint]
+    edges = np.where(edges < rods.edge_count, edges, edges[:, ::-1])
+    width, axial = 2.0 * rods.half_width[edges].mean(axis=1), rods.axial_stiffness[edges].mean(axis=1)
+    stiffness = 0.25 * width**4 * axial / found.column("voronoi_length")[joint] ** 3
+    return Flattening.zeros(
+        UNALLOCATED,
+        first=count,
+        joint=joint,
+        poisson=poisson,
+        stiffness=stiffness,
+        scale=stiffness * (1.0 - poisson**2) / rods.joint_stiffness[joint, 0],
     )
 
 

@@ -17,6 +17,7 @@ from bilayer_core.model.findings import few
 from bilayer_core.model.free_motions import mechanisms_of
 from bilayer_core.model.friction_pairs import friction_of_rods, slides
 from bilayer_core.model.rod_pairs import RodPair, rod_pairs
+from bilayer_core.model.strip_choice import section_of
 from bilayer_core.scene.body import Prescribed
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.load import Load
@@ -155,6 +156,11 @@ def _restitution(q: Question) -> str | None:
     return _unless(bodies, "no body that can touch anything")
 
 
+def _flattening(q: Question) -> str | None:
+    strips = q.model == "laminate" and any(section_of(q.scene, rod) == "strip" for rod in q.scene.rods)
+    return _unless(strips, "no rod is a strip (`section`)")
+
+
 def _rod_barrier(q: Question) -> str | None:
     if q.rods_touch:
         return None
@@ -178,6 +184,7 @@ FORCES: tuple[Force, ...] = (
     Force("stretching", CONSERVATIVE, "stretch.py", _always),
     Force("bending", CONSERVATIVE, "bend_twist.py", _always),
     Force("twisting", CONSERVATIVE, "bend_twist.py", lambda q: _unless(q.dimension == 3, "nothing twists in a plane")),
+    Force("flattening", CONSERVATIVE, "flattening.py", _flattening),
     Force("bond", CONSERVATIVE, "bond.py", _bond),
     Force("joints", CONSERVATIVE, "joints.py", _joints),
     Force("joint friction", DISSIPATIVE, "mechanisms.py", _joint_friction),

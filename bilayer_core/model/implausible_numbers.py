@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from bilayer_core.model.edge_figures import edge_figures
 from bilayer_core.model.findings import Finding
-from bilayer_core.model.validity import edge_figures
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.profile import extremes
 

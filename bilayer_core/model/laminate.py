@@ -33,6 +33,7 @@ from bilayer_core.model.strands import (
     strand_shape,
     with_copies,
 )
+from bilayer_core.model.strip_choice import section_of
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.diffusion_modes import Response, responses
 from bilayer_core.scene.pattern import stacked
@@ -115,6 +116,10 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
     found.rods += [[(0, int(nodes[-1]), strand.first_node, strand.first_edge)] for strand in strands]
     found.path_height += [path] * len(copies)
     joints = add_strands(found, scene, rod, strands, shape, elements, body_index)
+    if section_of(scene, rod) == "strip":
+        own = np.sort(joints[joints >= 0])
+        ratio = scene.materials[rod.layers[0].material].poisson_ratio
+        found.add(strip_joint=own, strip_poisson=np.full(len(own), ratio))
     coupling = whole.strain_coupling()
     coupled = coupling.any(axis=-1) & (joints >= 0)
     found.add(coupled_joint=joints[coupled], strain_coupling=coupling[coupled])
@@ -310,6 +315,7 @@ def _add_eigenstrain(
     first_edge = np.array([[strand.first_edge] for strand in strands])
     of_edges: list[tuple[Array, ...]] = []
     of_joints: list[tuple[Array, ...]] = []
+    strip = section_of(scene, rod) == "strip"
     followed = [(layer, law, part) for layer, part in zip(rod.layers, parts, strict=True) for law in layer.eigenstrain]
     for layer, law, part in followed:
         edges, covered = np.array(rod.driven_edges(layer, law)), driven_cells(rod, cells, layer, law)
@@ -331,9 +337,14 @@ def _add_eigenstrain(
             if gradient >= 0:
                 laws.append((gradient, *whole.driven_by_gradient(part, grown, layer.thickness)))
             for number, weight, bend in laws:
-                weight = weight[:, driven]
+                weight = weight[:, driven] if layer.swelling != "across" else np.zeros_like(weight[:, driven])
                 of_edges.append((first_edge + driven, np.full(weight.shape, number), weight))
                 bent = (bend != 0.0) & (joints >= 0)
+                if strip and layer.swelling != "along":
+                    curl = np.full(bent.sum(), number)
+                    found.add(curled_joint=joints[bent], curled_law=curl, curled_weight=bend[bent])
+                if layer.swelling == "across":
+                    bent = np.zeros_like(bent)
                 copy, _ = np.nonzero(bent)
                 of_joints.append((copy, joints[bent], np.full(len(copy), number), bend[bent]))
     if not of_edges:

@@ -16,6 +16,7 @@ from bilayer_core.model.records.parts import (
     Bonds,
     Constrained,
     Drives,
+    Flattening,
     Flow,
     Fluid,
     Joins,
@@ -73,6 +74,7 @@ class Model(ReadOnlyArrays):
     light: Light
     plane: Plane  # absent in three dimensions
     off_axis: OffAxis
+    flattening: Flattening  # absent without strips
     bonds: Bonds
     raised: Raised  # absent where everything acts on the curve
     kept_directors: int  # of edges where something may act off the curve under other loads, too

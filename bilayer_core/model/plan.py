@@ -18,6 +18,7 @@ from bilayer_core.model.planarity import find_plane, require_plane
 from bilayer_core.model.redundancy import redundant_joints, require_possible_motion
 from bilayer_core.model.rod_pairs import RodPair, passing_warnings, rod_pairs
 from bilayer_core.model.rods import snapped_layers
+from bilayer_core.model.strip_choice import refusal, section_of
 from bilayer_core.model.twisted import HELIX, helix_error, twist_figures
 from bilayer_core.model.validity import validity_warnings
 from bilayer_core.scene.config import Coupling, SceneConfig
@@ -78,6 +79,9 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
     chosen_model, reasons["model"] = _choose("model", model, solver.model, MODELS) or simplest_model(scene)
     if chosen_model == "laminate":
         _refuse_laminate(scene)
+    for rod in scene.rods:
+        if section_of(scene, rod) == "strip":
+            _refuse_strip(scene, rod, chosen_model)
     asked = _choose("dimension", dimension, solver.dimension, DIMENSIONS)
     if asked is not None and asked[0] == 2:
         asked = 2, f"{asked[1]}: all stays in {require_plane(scene)}"
@@ -133,6 +137,8 @@ def simplest_model(scene: SceneConfig) -> tuple[str, str]:
     if scene.coupling != Coupling():
         return "two_rod", "`coupling` is set: only the two-rod model has a bond that gives"
     for rod in scene.rods:
+        if section_of(scene, rod) == "strip":
+            return "laminate", f"rods.{rod.name}: its section bends (`section: {rod.section}`), which two rods cannot"
         if len(_retardation_times(rod, scene)) > 1:
             return "two_rod", f"rods.{rod.name}: layers with different retardation times, of which a curve has one"
         error = helix_error(scene, rod)
@@ -154,6 +160,16 @@ def _refuse_laminate(scene: SceneConfig) -> None:
                 f"model: laminate has one retardation time along a rod, the layers of rods.{rod.name} have "
                 f"{' and '.join(f'{time:g} s' for time in sorted(times))}; allowed: two_rod, or equal times"
             )
+
+
+def _refuse_strip(scene: SceneConfig, rod: Rod, model: str) -> None:
+    if model == "two_rod":
+        raise SceneError(
+            f"model: two_rod has layers that keep their section, and the bond of rods.{rod.name} (`section: strip`) "
+            "has no part across the width; allowed: laminate"
+        )
+    if why := refusal(scene, rod):
+        raise SceneError(f"rods.{rod.name}.section: strip {why}; allowed: beam")
 
 
 def _is_viscous(scene: SceneConfig) -> bool:

@@ -78,6 +78,12 @@ def swollen_curvature(ratio: Array, poisson: float) -> Array:
     return np.interp(np.log(np.maximum(ratio, RATIOS[0])), np.log(RATIOS), _rests(poisson))
 
 
+def swollen_curvature_across(ratio: Array, poisson: float) -> Array:
+    """Return the mean curvature across over κ̄, in the state of `swollen_curvature`: (1 − ν (κ/κ̄ − 1)) g."""
+    along = swollen_curvature(ratio, poisson)
+    return (1.0 - poisson * (along - 1.0)) * _factor(ratio * along, poisson)
+
+
 def curved_stiffness(ratio: Array, poisson: float) -> Array:
     """Return the bending stiffness at rest, over EI, of strips that are curved without swelling, by their w²κ/H."""
     return (1.0 - poisson**2 * _factor(ratio, poisson)) / (1.0 - poisson**2)

@@ -22,9 +22,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bilayer_core.model.edge_figures import edge_figures
 from bilayer_core.model.findings import Finding
 from bilayer_core.model.section import sections
-from bilayer_core.model.validity import edge_figures
 from bilayer_core.scene.body import Prescribed
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.profile import values_at

@@ -28,12 +28,12 @@ from bilayer_core.contact.facet import BORDERS, INSIDE, WHOLE
 from bilayer_core.errors import SceneError
 from bilayer_core.jit import UNALLOCATED
 from bilayer_core.model.colliders import meets_with_borders
+from bilayer_core.model.edge_figures import edge_figures
 from bilayer_core.model.records.contacts import Rails
 from bilayer_core.model.rod_pairs import rod_pairs
 from bilayer_core.model.rod_rails import build_rails, start_rails
 from bilayer_core.model.strand_arrays import StrandArrays
 from bilayer_core.model.strands import Collected
-from bilayer_core.model.validity import edge_figures
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.rod import Rod
 

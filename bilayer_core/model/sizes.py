@@ -27,6 +27,8 @@ def sizes_of(model: Model) -> dict[str, int]:
         "edge": rods.edge_count,
         "edge+clamp": edges,
         "joint": joints,
+        "joint rest": len(model.drives.joint_rest),
+        "strip joint": len(model.flattening.joint),
         "pair": pairs,
         "strain": model.strain_count + impacts + len(model.mechanisms) + 3 * model.kept_directors,
         "raised": raised,

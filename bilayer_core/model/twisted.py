@@ -35,9 +35,9 @@ from itertools import product
 
 import numpy as np
 
+from bilayer_core.model.edge_figures import edge_figures
 from bilayer_core.model.findings import Figure
 from bilayer_core.model.section import bond, outline, sections
-from bilayer_core.model.validity import edge_figures
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.profile import extremes, values_at
 from bilayer_core.scene.rod import Rod

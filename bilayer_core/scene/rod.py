@@ -66,6 +66,10 @@ class Layer(Part):
     """Of the layer by itself, through the thickness, positive where it bends to the normal; default: the path's."""
     natural_curvature_across: varying(Curvature) | None = None
     """Of the layer by itself, across the width, positive where it bends to path × normal; default: the path's."""
+    swelling: Literal["isotropic", "along", "across"] = "isotropic"
+    """Direction in the layer's plane in which its eigenstrain acts: all, or one along or across the path, as that of
+    aligned fibres. A rod with `section: strip` curls across as well.
+    """
     natural_twist: varying(Twist) = 0.0
     """Of the layer by itself, about the path, beside the twist of the path."""
 
@@ -111,6 +115,10 @@ class Rod(Part):
     """Bottom first."""
     diffusion: Diffusions = []
     """Of moisture or heat through the layers; one field or several. Layers without one follow with their lags."""
+    section: Literal["beam", "strip", "auto"] = "beam"
+    """`beam`: the section keeps its shape, right for w²κ/H below about 1; `strip`: it curls across the width, of any
+    width; `auto`: `strip` where curvature or stiffness would differ by more than 1 %.
+    """
     torsion: Literal["laminate", "layers"] = "laminate"
     """Torsional stiffness: of the bonded section, or the sum of the layers' own."""
     friction_axis: Literal["path", "normal", "across"] = "path"
@@ -325,6 +333,7 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
         )
         faults.append((("layers",), [layer.interval for layer in rod.layers], demand))
     faults += _faults_of_diffusion(rod)
+    faults += _faults_of_section(rod)
     faults += _faults_of_copies(rod) if rod.pattern is not None else ()
     for key in ("velocity", "angular_velocity"):
         if getattr(rod, key) is not None and any(variant.clamp_start or variant.clamp_end for variant in rod.variants):
@@ -410,6 +419,14 @@ def _faults_of_diffusion(rod: Rod) -> Iterator[Fault]:
         if not followed:
             demand = f"must be that of a law of a layer in `diffusivity` ({', '.join(field.diffusivity)})"
             yield (*where, "stimulus"), field.stimulus, demand
+
+
+def _faults_of_section(rod: Rod) -> Iterator[Fault]:
+    """Yield the faults of layers that only a strip can have."""
+    for index, layer in enumerate(rod.layers):
+        if layer.swelling == "across" and rod.section != "strip":
+            demand = "must be isotropic or along: a beam does not feel it; `section: strip` of the rod does"
+            yield ("layers", index, "swelling"), layer.swelling, demand
 
 
 LEAST_CLOSED = 5

@@ -8,15 +8,17 @@ added mass a flow has a potential (`forces.added_mass`).
 Forces that turn with what they act on, moments on bodies and light are taken at q_k and agree with the shape in the
 end. Where a round does not converge under such forces, Newton's method with all of their stiffness looks for
 rest (`simulation.following_newton`). Whether the equilibrium is stable is asked of V, or of the modes of small motions
-where forces have no potential (`simulation.growing_modes`).
+where forces have no potential (`simulation.growing_modes`). In space, strips that curl across begin with a small twist,
+since V is not convex there and rounds make no way beside a shape that only twist makes unstable
+(`simulation.strip_sections`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -30,6 +32,7 @@ from bilayer_core.model.records.status import CROSSED, MAX_ITERATIONS
 from bilayer_core.model.state import NOT_KNOWN, State, reached_at_rest
 from bilayer_core.simulation.crossing_remedy import crossing
 from bilayer_core.simulation.stepper import Stepper
+from bilayer_core.simulation.strip_sections import disturb, shapes
 
 FIRST, GROWTH, SHRINKAGE, SHORTEST = 1e-2, 10.0, 0.25, 1e-7
 """Length h of the first round [s], its factors after success and failure, and the length at which to give up [s]."""
@@ -85,6 +88,7 @@ class StaticReport:
     factorisations: int
     growth_rate: float = 0.0
     growth_frequency: float = 0.0
+    strips: Mapping[str, str] = field(default_factory=dict)
 
 
 def solve_static(
@@ -173,6 +177,8 @@ class _Search:
         state.touched.fill(NOT_KNOWN)
         self.light = light_of(model)
         self._drive(stepper)
+        if not model.plane.exists:
+            disturb(model, state)
         self.rounds = self.iterations = self.factorisations = 0
         self.sought = False
         self.growth_after_failure = CAREFUL_GROWTH if follows(model) else GROWTH
@@ -275,9 +281,16 @@ class _Search:
             unstable, rate, frequency = grows.count, grows.rate, grows.frequency
             if unstable and self.in_space is not None:
                 out_of_plane = unstable - growing_modes(space.model, self.state, load_factor, self.stepper.model).count
+        strips = shapes(self.stepper.model, self.state)
+        for name in (name for name, shape in strips.items() if shape == "folded"):
+            raise self._failure(
+                f"rods.{name} folds: a part of it curls along and a part rolls up across, and where depends on the "
+                "mesh; raise its stimulus in steps, with statics after each",
+                0.0,
+            )
         self.stepper.restart(self.state)
         counts = self.rounds, self.iterations, self.factorisations
-        return StaticReport(unstable == 0, unstable, out_of_plane, residual, *counts, rate, frequency)
+        return StaticReport(unstable == 0, unstable, out_of_plane, residual, *counts, rate, frequency, strips)
 
     def _unstable(self, stepper: Stepper) -> int:
         """Return the number of negative eigenvalues of the Hessian of a model at the equilibrium."""

@@ -16,6 +16,7 @@ from bilayer_core.observed.system import versions
 from bilayer_core.simulation.plane_watch import PlaneWatch
 from bilayer_core.simulation.run_result import Termination
 from bilayer_core.simulation.statistics import RunStatistics
+from bilayer_core.simulation.strip_sections import folded
 from bilayer_core.simulation.views.body import BodyView
 from bilayer_core.simulation.views.joint import JointView
 
@@ -108,6 +109,7 @@ def summarise(simulator: Any) -> dict:
             *simulator.start_warnings,
             *_warnings(statistics, numerical, through, simulator.plane_watch),
             *_of_contact(model, statistics.unresolved, largest),
+            *folded(model, simulator._state),
         ],
         "unseen": list(unseen_vibrations(simulator.scene)) if statistics.max_contact_force > 0.0 else [],
         "versions": versions(),

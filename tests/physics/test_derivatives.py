@@ -16,7 +16,7 @@ from bilayer_core.forces.surface_friction import PARTS
 from bilayer_core.model.force_list import FORCES
 
 ELASTIC = ("stretching", "bending", "twisting", "bond")
-ROD_CONTACT = ("rod barrier", "rod friction")  # nothing in this scene touches: see `test_rod_contact.py`
+ROD_CONTACT = ("rod barrier", "rod friction", "flattening")  # see `test_rod_contact.py`, `test_flattening.py`
 ALONE = [force.name for force in FORCES if force.kind is not None and force.name not in ROD_CONTACT]
 OTHERS = tuple(name for name in ALONE if name not in ELASTIC)
 TOGETHER = {"all but elasticity": OTHERS, "everything": None}

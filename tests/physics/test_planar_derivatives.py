@@ -10,7 +10,7 @@ from bilayer_core.model.plan import MODELS
 
 ELASTIC = ("stretching", "bending", "bond")
 IDLE = ("rod barrier", "rod friction")  # nothing in this scene touches: see below
-IN_SPACE = ("twisting", "turning drag", "gyroscopic")
+IN_SPACE = ("twisting", "turning drag", "gyroscopic", "flattening")
 ALONE = [force.name for force in FORCES if force.kind is not None and force.name not in (*IN_SPACE, *IDLE)]
 
 

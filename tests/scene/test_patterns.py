@@ -7,8 +7,8 @@ from support.sample_scenes import contact, fixed, layer, rod, scene
 from bilayer_core import load_scene
 from bilayer_core.cli import main
 from bilayer_core.errors import SceneError
+from bilayer_core.model.edge_figures import EdgeFigures
 from bilayer_core.model.plan import best_dimension, make_plan
-from bilayer_core.model.validity import EdgeFigures
 from bilayer_core.scene.loader import scene_text
 from bilayer_core.scene.pattern import pair_at_one_place
 from bilayer_core.scene.text import read_yaml

@@ -17,6 +17,7 @@ BUNDLED = {
     "crawling_dual_leg": (3, "rods.hind_foot leaves the plane y = 0"),
     "crawling_film": (2, "all stays in the plane y = 0"),
     "crawling_inchworm": (2, "all stays in the plane y = 0"),
+    "films": (3, "rods.all_around leaves the plane y = -0.025 m"),
     "flagellum": (2, "all stays in the plane y = 0"),
     "gripping": (3, "rods.arm_1 leaves the plane y = 0"),
     "gripping_friction": (3, "rods.arm_1 leaves the plane y = 0"),

@@ -5,11 +5,12 @@ import pytest
 from support.sample_scenes import GEL, ball, contact, layer, rod, scene
 
 from bilayer_core import load_scene
+from bilayer_core.model.edge_figures import EdgeFigures
 from bilayer_core.model.findings import told as told_of
 from bilayer_core.model.implausible_numbers import implausible_numbers
 from bilayer_core.model.plan import make_plan
 from bilayer_core.model.plate_strip import curved_stiffness, folds, swollen_curvature
-from bilayer_core.model.validity import EdgeFigures, validity_figures, validity_warnings
+from bilayer_core.model.validity import validity_figures, validity_warnings
 
 HEAT = {"heat": {"schedule": {"type": "hold", "value": 1.0}}}
 

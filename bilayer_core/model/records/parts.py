@@ -51,7 +51,7 @@ class Drives:
     driven_edge: Indices  # edges that follow a law, once for each law, shape (n_driven,)
     driven_law: Indices  # the law that each of them follows, shape (n_driven,)
     driven_weight: Vector  # its part of the law's eigenstrain, shape (n_driven,)
-    joint_rest: Matrix  # κ̄₁ κ̄₂ ψ̄ without stimuli [rad], shape (n_joint, 3)
+    joint_rest: Matrix  # κ̄₁ κ̄₂ ψ̄ without stimuli, then κ̄y Δl of strips [rad], shape (n_joint + n_strip_joint, 3)
     driven_joint: Indices  # joints whose κ̄₁ follows a law, once for each law, shape (n_driven_joint,)
     driven_joint_law: Indices  # likewise
     driven_joint_weight: Vector  # κ̄₁ per eigenstrain of the law [rad], likewise
@@ -98,6 +98,19 @@ class OffAxis:
     joint: Indices  # whose κ̄₁ depends on the strains of its edges, shape (n_coupled,)
     slope: Matrix  # b/|ē| of either edge, ∂κ̄₁ by its length, 0 for a clamp edge [rad/m], shape (n_coupled, 2)
     rest: Matrix = ("joint", 3)  # of all joints at the present strains [rad]
+
+
+@record
+class Flattening:
+    """Joints of strips whose section bends; see `forces.flattening`."""
+
+    first: int  # row of `Stage.rest_joint` with κ̄y Δl of the first of them, those of others follow
+    joint: Indices  # shape (n_strip_joint,)
+    poisson: Vector  # ν, likewise
+    stiffness: Vector  # s = w⁴ EA/(4 Δl³) [N m], likewise
+    scale: Vector  # Λ, likewise
+    pull: Vector = ("joint rest",)  # derivative of the energy by each row of `Stage.rest_joint` [N m]
+    slope: Vector = ("strip joint",)  # second derivative by κ̄y Δl [N m]
 
 
 @record

@@ -11,6 +11,7 @@ from bilayer_core.model.records.parts import (
     Bonds,
     Constrained,
     Drives,
+    Flattening,
     Flow,
     Fluid,
     Joins,
@@ -169,6 +170,7 @@ class Problem:
     space: Space
     plane: Plane
     off_axis: OffAxis
+    flattening: Flattening
     bonds: Bonds
     raised: Raised
     bodies: Bodies

@@ -8,6 +8,7 @@ from bilayer_core.model.model import Model
 from bilayer_core.model.strand_arrays import StrandArrays
 from bilayer_core.observed.frame import Strand
 from bilayer_core.simulation import observation as observe
+from bilayer_core.simulation.strip_sections import across_at_nodes
 from bilayer_core.simulation.views.present import ByName, Present
 
 Array = np.ndarray
@@ -34,6 +35,9 @@ class RodView:
         Axial strain at each node, eigenstrain included, shape (nodes,).
     curvature : Array
         Curvature χ through the thickness at each node [1/m], shape (nodes,).
+    section_curvature : Array
+        Mean curvature of the section across the width at each node [1/m], positive where the borders rise along m1,
+        shape (nodes,); 0 in a beam. The section rises by about an eighth of it times the width squared.
     contact_forces : Array
         Barrier and friction force on each node [N], shape (nodes, 3).
     layers : ByName
@@ -80,6 +84,10 @@ class RodView:
     @property
     def curvature(self) -> Array:
         return self._present.seen().curvature[self.nodes]
+
+    @property
+    def section_curvature(self) -> Array:
+        return across_at_nodes(self._present.model, self._present.state)[self.nodes]
 
     @property
     def contact_forces(self) -> Array:

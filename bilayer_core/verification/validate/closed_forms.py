@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 from scipy.integrate import solve_bvp, solve_ivp
-from scipy.optimize import brentq, minimize
+from scipy.optimize import brentq, minimize, minimize_scalar
 
 EULER_FREE_END = math.pi**2 / 4.0
 """P L²/EI at which a column with one free end buckles."""
@@ -305,3 +305,44 @@ def lag_behind(seen: Callable[[float], float], lag: float, time: float) -> float
     """Return y at a time [s] where T y′ = u − y follows u, from where it has settled."""
     found = solve_ivp(lambda t, y: (seen(t) - y) / lag, (0.0, time), [seen(0.0)], rtol=1e-12, atol=1e-14, max_step=1e-3)
     return float(found.y[0, -1])
+
+
+class PlateStrip:
+    """A plate strip solved across its width, in units of E, H and w: curved by r along, it bends across to u(y), which
+    stretches its fibres by r (u − mean).
+
+    Attributes
+    ----------
+    poisson : float
+    second, squares : ndarray
+        ∫ of u″ of each shape, and ∫ of products of u″ and of u; shapes are even Legendre polynomials.
+    """
+
+    def __init__(self, poisson: float, shapes: int = 25):
+        self.poisson, self.stiffness_of_plate = poisson, 1.0 / (12.0 * (1.0 - poisson**2))
+        basis = [np.polynomial.Legendre.basis(2 * n + 2, domain=(-0.5, 0.5)) for n in range(shapes)]
+        points, weights = np.polynomial.legendre.leggauss(2 * shapes + 4)
+        values = np.array([[shape(0.5 * points), shape.deriv(2)(0.5 * points)] for shape in basis])
+        self.second = values[:, 1] @ (0.5 * weights)
+        self.squares = [np.einsum("im,jm,m->ij", own, own, 0.5 * weights) for own in (values[:, 1], values[:, 0])]
+
+    def _moment(self, curvature: float, natural: float) -> tuple[float, float]:
+        """Return the energy and the moment ∂U/∂r of a strip with the natural curvature `natural` in all directions."""
+        d, change = self.stiffness_of_plate, curvature - natural
+        matrix = d * self.squares[0] + curvature**2 * self.squares[1]
+        force = d * (natural - self.poisson * change) * self.second
+        u = np.linalg.solve(matrix, force)
+        energy = 0.5 * d * (change**2 + natural**2 - 2.0 * self.poisson * change * natural) - 0.5 * force @ u
+        bent = self.second @ u - natural
+        return energy, d * (change + self.poisson * bent) + curvature * u @ self.squares[1] @ u
+
+    def swollen_curvature(self, ratio: float) -> float:
+        """Return κ/κ₀ at rest of a strip that swells alike in all directions, by its w²κ₀/H."""
+        found = minimize_scalar(
+            lambda k: self._moment(k * ratio, ratio)[0] / ratio**2, bounds=(0.6, 1.6), method="bounded"
+        )
+        return found.x
+
+    def stiffness(self, ratio: float) -> float:
+        """Return M/(EI κ) of a straight strip, by its w²κ/H."""
+        return 12.0 * self._moment(ratio, 0.0)[1] / ratio

@@ -1,0 +1,192 @@
+"""Which section a rod has, a beam's or a strip's, and by how much the two differ at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from bilayer_core.model.edge_figures import EdgeFigures, edge_figures
+from bilayer_core.model.findings import Figure
+from bilayer_core.model.plate_strip import curved_stiffness, folds, swollen_curvature, swollen_curvature_across
+from bilayer_core.scene.config import Coupling, SceneConfig
+from bilayer_core.scene.profile import Profile
+from bilayer_core.scene.rod import Rod
+
+MOST = 0.01
+"""Of curvature or stiffness at rest: difference from a beam above which `section: auto` is a strip."""
+PLATE = 0.05
+"""Likewise above which a beam is told to be wrong."""
+BROADEST = 100.0
+"""w²κ/H up to which strips are asked whether they fold."""
+BISECTIONS = 20
+HELD = 0.2
+"""Part of a strip within one width from its clamps that counts."""
+
+
+@dataclass(frozen=True)
+class Departure:
+    """Difference of a strip from a beam, at the edge where it is largest.
+
+    Attributes
+    ----------
+    of_curvature, swollen : float
+        Of the curvature at rest of edges that swell alike in all directions, as a part of the beam's; their w²κ/H.
+    of_stiffness, curved : float
+        Likewise of the bending stiffness of edges that are curved by their path, or that swell along it alone.
+    """
+
+    of_curvature: float
+    swollen: float
+    of_stiffness: float
+    curved: float
+
+
+def departure(rod: Rod, at_edges: EdgeFigures) -> Departure:
+    """Return by how much a strip with the figures of a rod differs from a beam."""
+    curvature, poisson = at_edges.curvature(), at_edges.poisson_ratio
+    ratio = at_edges.width**2 * curvature / at_edges.thickness
+    swells = at_edges.free_curvature() > 0.5 * curvature
+    if all(layer.swelling == "along" for layer in rod.layers if layer.eigenstrain):
+        swells[:] = False
+    change, swollen = 0.0, 0.0
+    if swells.any():
+        changes = swollen_curvature(ratio[swells], poisson) - 1.0
+        worst = int(np.abs(changes).argmax())
+        change, swollen = float(changes[worst]), float(ratio[swells][worst])
+    curved = float(ratio[~swells].max(initial=0.0))
+    return Departure(change, swollen, float(curved_stiffness(curved, poisson)) - 1.0 if curved else 0.0, curved)
+
+
+def refusal(scene: SceneConfig, rod: Rod) -> str:
+    """Return why a rod of the laminate cannot be a strip; empty if it can."""
+    if rod.radius is not None:
+        return "needs a rectangular section, and it is round"
+    ratios = sorted({scene.materials[layer.material].poisson_ratio for layer in rod.layers})
+    if len(ratios) > 1:
+        told = " and ".join(f"{ratio:g}" for ratio in ratios)
+        return f"needs layers with one poisson_ratio, has {told}: unlike ones curl across by themselves"
+    if len({scene.materials[layer.material].retardation_time for layer in rod.layers}) > 1:
+        return "needs layers with one retardation_time"
+    for layer in rod.layers:
+        if layer.interval is not None:
+            return f"needs layers that cover all of it, and {layer.name} has an `interval`"
+        if layer.natural_twist != 0.0:
+            return f"takes its twist from its path, and {layer.name} has a `natural_twist`"
+        for key in ("thickness", "stiffness"):
+            if isinstance(getattr(layer, key), Profile):
+                return f"needs one {key} all along it, and that of {layer.name} is a profile"
+    return ""
+
+
+def section_of(scene: SceneConfig, rod: Rod) -> str:
+    """Return the section of a rod in the laminate, `beam` or `strip`; `auto` is a strip where that differs from a beam
+    by more than `MOST` and can be computed.
+    """
+    if rod.section != "auto":
+        return rod.section
+    if scene.solver.model == "two_rod" or scene.coupling != Coupling():
+        return "beam"
+    if rod.radius is not None:
+        return "beam"
+    found = departure(rod, edge_figures(scene, rod))
+    return "strip" if max(abs(found.of_curvature), found.of_stiffness) > MOST and not refusal(scene, rod) else "beam"
+
+
+@lru_cache(maxsize=32)
+def folding_ratio(poisson: float) -> float:
+    """Return w²κ̄/H from which on strips that swell alike in all directions have negative tangents; infinite if none
+    has.
+    """
+    low, high = 0.0, BROADEST
+    if not folds(high, poisson):
+        return np.inf
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if folds(middle, poisson) else (middle, high)
+    return high
+
+
+def plate_figures(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
+    """Yield how a strip as wide as a rod differs from a beam, and, of a strip, when it may fold and how high its
+    section rises.
+    """
+    if rod.radius is not None:
+        return
+    where, found, strip = f"rods.{rod.name}", departure(rod, at_edges), section_of(scene, rod) == "strip"
+    change, stiffer = found.of_curvature, found.of_stiffness
+    if found.swollen > 0.0:
+        outside = (
+            "its section bends as well; that of a beam does not: give it `section: strip`, or, if its layers swell "
+            "along it alone, `swelling: along`"
+        )
+        yield Figure(
+            where,
+            f"a {'strip' if strip else 'plate'} as wide, swelling alike in all directions, "
+            f"{'curls' if strip else 'would curl'}",
+            f"{100 * abs(change):.2g} % {'less' if change < 0.0 else 'more'} than "
+            f"{'a beam' if strip else 'computed'} (w²κ/H {found.swollen:.2g})",
+            "computed so" if strip else f"at most {100 * PLATE:g} %",
+            abs(change) / PLATE,
+            outside if abs(change) > PLATE and not strip else "",
+        )
+    if found.curved > 0.0:
+        yield Figure(
+            where,
+            f"a {'strip' if strip else 'plate'} as wide and curved {'is' if strip else 'would be'} "
+            "stiffer in bending by",
+            f"{100 * stiffer:.2g} % (w²κ/H {found.curved:.2g})",
+            "computed so" if strip else f"at most {100 * PLATE:g} %",
+            stiffer / PLATE,
+            "its section keeps its shape; that of a beam bends freely" if stiffer > PLATE and not strip else "",
+        )
+    if not strip:
+        return
+    limit = folding_ratio(at_edges.poisson_ratio)
+    if found.swollen > 0.0:
+        yield _of_folds(where, at_edges, found.swollen, limit)
+    if scene.contact is not None:
+        yield from _of_height(where, at_edges, found.swollen, limit, scene.contact.barrier_distance)
+    held = sum(bool(end) for end in (rod.clamp_start, rod.clamp_end)) * float(at_edges.width.max()) / rod.path.length
+    if held > HELD:
+        yield Figure(
+            where,
+            "within one width from clamps, which keep its section flat, is",
+            f"{100 * held:.2g} % of it",
+            f"at most {100 * HELD:g} %",
+            held / HELD,
+            "a strip curls across up to its clamps",
+        )
+
+
+def _of_folds(where: str, at_edges: EdgeFigures, ratio: float, limit: float) -> Figure:
+    strain = f" (an eigenstrain of {100 * float(at_edges.eigenstrain.max()) * limit / ratio:.3g} %)"
+    return Figure(
+        where,
+        "as a strip it swells up to w²κ/H of",
+        f"{ratio:.3g}",
+        f"at most {limit:.3g}{strain if ratio > limit else ''}",
+        ratio / limit,
+        "beyond, held straighter it may fold in one place, as a tape spring does, and the mesh says where"
+        if ratio > limit
+        else "",
+    )
+
+
+def _of_height(where: str, at_edges: EdgeFigures, ratio: float, limit: float, distance: float) -> Iterator[Figure]:
+    """Yield the height of a section, κ_y w²/8, of that in which κ̄y is largest."""
+    free = float((at_edges.free_curvature(across=True) * at_edges.width**2).max()) / 8.0
+    if 0.0 < ratio <= limit:  # beyond it may roll up across, where κ̄y is all there is
+        ratios = np.linspace(0.0, ratio, 101)[1:]
+        free *= float((swollen_curvature_across(ratios, at_edges.poisson_ratio) * ratios).max()) / ratio
+    if free > 0.0:
+        yield Figure(
+            where,
+            "its section rises by",
+            f"{1e3 * free:.3g} mm across",
+            f"at most {1e3 * distance:g} mm, the barrier distance",
+            free / distance,
+            "contact takes it as flat across" if free > distance else "",
+        )

@@ -1,0 +1,135 @@
+"""Sections of strips: how they are curved across, what statics disturb, and names of shapes at rest.
+
+Names are those of `forces.flattening`. The moment across that a section carries is −∂F/∂κ̄y, which leaves, in the mean
+over its width,
+
+    κ_y Δl = κ̄y Δl − ν (κ₁ − κ̄₁) − N Λ κ₁ φ(Λ κ₁²)
+
+from the curvature of a free plate, where a strip is narrow, to θ²/κ₁ where it is wide. A swollen strip that is wide
+enough has two shapes at rest, curled along or rolled up across. Where both are in one strip, it has folded: how far
+the one reaches depends on the mesh, since the law of a joint knows nothing of the joints beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from bilayer_core.forces.flattening import flatness
+from bilayer_core.model.model import Model
+from bilayer_core.model.plate_strip import folds
+from bilayer_core.model.state import State
+from bilayer_core.model.strand_arrays import StrandArrays
+from bilayer_core.scene.transduction import free_strain
+
+Array = np.ndarray
+DISTURBANCE = 1e-3
+"""Turn of the middle of a strip about its axis [rad] from which statics begin. Flat strips that swell, and strips that
+are rolled up across, may be unstable against twist alone, and nothing else leads away from them."""
+ACROSS = 2.0
+"""Curvature across over that along from which a section counts as rolled up across."""
+
+
+def _natural(model: Model, state: State) -> tuple[Array, Array, Array]:
+    """Return κ̄₁, θ̄ and κ̄y Δl of strip joints, shape (n_strip_joint,)."""
+    drives, strips, rest = model.drives, model.flattening, model.drives.joint_rest[:, [0, 2]].copy()
+    strain = free_strain(state.transduction, drives.law_gain, drives.law_reference, drives.law_saturation)
+    np.add.at(rest[:, 0], drives.driven_joint, drives.driven_joint_weight * strain[drives.driven_joint_law])
+    return rest[strips.joint, 0], rest[strips.joint, 1], rest[strips.first :, 0]
+
+
+def curvatures(model: Model, state: State) -> tuple[Array, Array]:
+    """Return the curvature along and the mean curvature across of strip joints [1/m], shape (n_strip_joint,).
+
+    Those beside a clamp have the values of the next joint.
+    """
+    rods, strips = model.rods, model.flattening
+    first, second = rods.joint_a[strips.joint], rods.joint_b[strips.joint]
+    inside = (first < rods.edge_count) & (second < rods.edge_count)
+    first, second = np.where(inside, first, 0), np.where(inside, second, 0)
+    vector = state.position[rods.edge_node + 1] - state.position[rods.edge_node]
+    tangent = vector / np.linalg.norm(vector, axis=1, keepdims=True)
+    a, b = tangent[first], tangent[second]
+    bend = np.einsum("ki,ki->k", b, state.director1[first]) - np.einsum("ki,ki->k", a, state.director1[second])
+    kappa, theta = bend / (1.0 + np.einsum("ki,ki->k", a, b)), state.twist[strips.joint]
+    along, twist, across = _natural(model, state)
+    flattened = kappa * (across + strips.poisson * (along - kappa)) - theta**2 + twist**2
+    phi = np.array([flatness(z)[0] for z in strips.scale * kappa**2])
+    curved = across - strips.poisson * (kappa - along) - flattened * strips.scale * kappa * phi
+    length = model.voronoi_length[strips.joint]
+    place = np.arange(len(kappa))
+    nearest = np.abs(place[:, None] - place[inside]).argmin(axis=1) if inside.any() else place
+    return (kappa / length)[inside][nearest], (curved / length)[inside][nearest]
+
+
+def across_at_nodes(model: Model, state: State) -> Array:
+    """Return the mean curvature across of strips at all nodes [1/m], 0 at those of beams, shape (n_node,)."""
+    found = np.zeros(model.node_count)
+    if not model.flattening.exists:
+        return found
+    across, rods, joint = curvatures(model, state)[1], model.rods, model.flattening.joint
+    inner = np.maximum(np.where(rods.joint_a < rods.edge_count, rods.joint_a, -1), rods.joint_b)[joint]
+    inner = np.where(inner < rods.edge_count, inner, np.minimum(rods.joint_a, rods.joint_b)[joint])
+    for strand in model.strands:
+        own = _joints_of(model, strand)
+        if len(own):
+            nodes = np.arange(strand.first_node, strand.first_node + strand.node_count)
+            places = rods.edge_node[inner[own]]
+            found[nodes] = across[own][np.abs(nodes[:, None] - places).argmin(axis=1)]
+    return found
+
+
+def _joints_of(model: Model, strand: StrandArrays) -> Array:
+    """Return which strip joints belong to a strand."""
+    edges, strips = model.rods, model.flattening
+    edge = np.minimum(edges.joint_a[strips.joint], edges.joint_b[strips.joint])
+    return np.flatnonzero((edge >= strand.first_edge) & (edge < strand.first_edge + strand.node_count - 1))
+
+
+def disturb(model: Model, state: State) -> None:
+    """Turn the edges of strips that curl across about their tangents, most between the ends, by `DISTURBANCE`."""
+    natural = _natural(model, state)[2] if model.flattening.exists else np.zeros(0)
+    for strand in model.strands:
+        if not natural.any() or not natural[_joints_of(model, strand)].any():
+            continue
+        edges = np.arange(strand.first_edge, strand.first_edge + strand.node_count - 1)
+        place = np.linspace(0.0, 1.0, len(edges))
+        angle = DISTURBANCE * 6.75 * (place**2 * (1.0 - place))[:, None]
+        director = state.director1[edges]
+        vector = state.position[model.rods.edge_node[edges] + 1] - state.position[model.rods.edge_node[edges]]
+        tangent = vector / np.linalg.norm(vector, axis=1, keepdims=True)
+        state.director1[edges] = np.cos(angle) * director + np.sin(angle) * np.cross(tangent, director)
+
+
+def shapes(model: Model, state: State) -> dict[str, str]:
+    """Return the shape of each strip that curls across: `curled along`, `rolled across` or `folded`."""
+    found: dict[str, str] = {}
+    if not model.flattening.exists:
+        return found
+    along, across = (np.abs(part) for part in curvatures(model, state))
+    natural, strips = np.abs(_natural(model, state)[2]), model.flattening
+    ratio = np.sqrt(strips.scale / (3.0 * (1.0 - strips.poisson**2))) * natural  # w²κ̄y/H
+    for strand in model.strands:
+        own = _joints_of(model, strand)
+        if not len(own) or not natural[own].any():
+            continue
+        rolled = across[own] > ACROSS * along[own]
+        worst = own[ratio[own].argmax()]
+        if rolled.all():
+            found[strand.rod] = "rolled across"
+        elif rolled.any() and folds(float(ratio[worst]), float(strips.poisson[worst])):
+            found[strand.rod] = "folded"
+        else:
+            found[strand.rod] = "curled along"
+    return found
+
+
+def folded(model: Model, state: State) -> Iterator[str]:
+    """Yield a warning for each strip that has folded."""
+    for name, shape in shapes(model, state).items():
+        if shape == "folded":
+            yield (
+                f"rods.{name} has folded: a part of it curls along and a part rolls up across, and where depends on "
+                "the mesh; a slower stimulus, or a strip that is less wide, does not fold"
+            )
