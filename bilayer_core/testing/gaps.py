@@ -14,6 +14,9 @@ scipy's k-d tree finds anew at every look; distances are computed by other formu
 The model keeps points apart, not all between them: surfaces may be nearer than it knows by `UNSURE` of the barrier
 distance, and rods, whose points are no farther apart than their radius, by √(4 + 1/4) − 2 of that where two cross.
 
+What the solver says touches must be near as well: contact does not act across air. It may act between neighbours on
+one rod that are no pair here, where the rod folds; these count for that alone.
+
 A look at the ends of a step cannot see what passed through something thin within it. So the straight way from the last
 look is gone through in parts, none of which moves anything by more than half of the smallest radius: what is deeper
 than half way inside another in between has *crossed* it. What moves in one step by more than twelve times its size goes
@@ -24,6 +27,7 @@ other by more than half of the length between them: where that straightens and b
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,10 +82,12 @@ class GapCheck:
         self._surfaces = surfaces_of(model, self._points)
         edge = model.rods.edge_node
         wide = _wide_rods(model)
-        self._has_width = np.zeros(len(edge))
+        self._has_width, self._rod_of_edge = np.zeros(len(edge)), np.empty(len(edge), dtype=object)
+        self._station_of_edge = np.zeros(len(edge), dtype=np.int64)
         for strand in model.strands:
             own = slice(strand.first_edge, strand.first_edge + strand.node_count - 1)
-            self._has_width[own] = strand.rod in wide
+            self._has_width[own], self._rod_of_edge[own] = strand.rod in wide, strand.rod
+            self._station_of_edge[own] = strand.first_station + np.arange(strand.node_count - 1)
         self._meeting = [np.flatnonzero(of.nodes[edge] & of.nodes[edge + 1]) for of in self._surfaces]
         self._smallest_radius = float(self._ribbons.radius[model.node_length > 0.0].min())
         if self._pairs:
@@ -131,6 +137,57 @@ class GapCheck:
             far = math.inf if self._pairs.has_all else FAR * unit
             gaps += [float(bound[~near].min(initial=far)), cores.apart(first[near], second[near], unit, unit)]
         return min(gaps + self._surface_gaps(sheet, at, math.inf))
+
+    def floating(self, at: Moment, contacts: Sequence[tuple[str, str]]) -> str:
+        """Describe something that feels a rod farther off than the barrier distance; empty if nothing does.
+
+        Parameters
+        ----------
+        at : Moment
+        contacts : sequence of (str, str)
+            Names of what the solver says touches, as in `Frame.contacts`.
+        """
+        if not contacts:
+            return ""
+        sheet, most = self._ribbons.sheet(at.sections), self._farthest(at)
+        for one, other in contacts:
+            gap = self._gap_between(sheet, at, one, other, most)
+            if gap > most:
+                return f"{one} and {other} touch across {1e3 * gap:.3g} mm of air"
+        return ""
+
+    def _farthest(self, at: Moment) -> float:
+        """Return from how far contact may act [m]: the barrier distance, with what the shape between stations leaves
+        open, a quarter of the second differences of sections.
+        """
+        bend = 0.0
+        for strand in self._model.strands:
+            own = at.sections[:, strand.first_node : strand.first_node + strand.node_count]
+            of_middle, of_border = np.linalg.norm(np.diff(own, 2, axis=1), axis=2)
+            bend = max(bend, float((of_middle + of_border).max(initial=0.0)))
+        return self._model.scene.contact.barrier_distance + self.unsure + 0.25 * bend
+
+    def _gap_between(self, sheet: Sheet, at: Moment, one: str, other: str, most: float) -> float:
+        """Return the gap of a rod and a surface or another rod [m], infinite if that is above `most`; 0 of what else
+        touches.
+        """
+        edges, unit = np.flatnonzero(self._rod_of_edge == one), self._model.scene.contact.barrier_distance
+        for number, surface in enumerate(self._surfaces):
+            if surface.name == other and edges.size:
+                place = at.surface_position[number], at.surface_rotation[number]
+                meeting = np.intersect1d(edges, self._meeting[number])
+                return sheet.least_gap(meeting, surface, place, unit, math.inf) if meeting.size else 0.0
+        others = np.flatnonzero(self._rod_of_edge == other)
+        if not edges.size or not others.size:
+            return 0.0
+        first, second = (of.ravel() for of in np.meshgrid(edges, others))
+        if one == other:  # of itself, all that do not share a station: where it folds, neighbours touch
+            station = self._station_of_edge
+            apart = np.abs(station[first] - station[second]) > 1
+            first, second = first[apart], second[apart]
+        sheet = sheet.straight(self._has_width)
+        near = sheet.apart_at_least(first, second)[0] < most
+        return sheet.apart(first[near], second[near], unit, math.inf)
 
     def crossed(self, at: Moment) -> str:
         """Describe a deep overlap on the straight way from the last look to this one; empty if there was none."""

@@ -2,7 +2,8 @@
 
 ========================= =====================================================================================
 finite                    positions and velocities are numbers
-gap                       the smallest gap is open, and nothing passed through anything (`testing.gaps`)
+gap                       the smallest gap is open, nothing passed through anything, and nothing that touches is
+                          farther apart than the barrier acts (`testing.gaps`)
 energy without driving    T + V can only fall: it rises by no more than `MOST_GAIN` of the largest energy
 energy with driving       T + V less supplied work can only fall, but for the quadrature of that work: it rises by no
                           more than `MOST_MADE` of the largest energy of the run
@@ -108,8 +109,9 @@ class Judge:
         if not self.min_gap > -self._gaps.unsure:
             own = f"the engine's own {frame.min_gap:.3g} m"
             raise Verdict(f"the smallest gap is {self.min_gap:.3g} m, {own}", frame.time)
-        if found := self._gaps.crossed(moment):
-            raise Verdict(found, frame.time)
+        for found in (self._gaps.crossed(moment), self._gaps.floating(moment, frame.contacts)):
+            if found:
+                raise Verdict(found, frame.time)
 
     def _look_at_energy(self, time: float) -> None:
         account = self._simulator.energy_account

@@ -70,6 +70,22 @@ def test_a_node_under_the_ground_is_seen():
     assert check.smallest(check.moment(down)) < 0.0
 
 
+def test_contact_across_air_is_seen():
+    simulator = simulator_of("integrator/sdirk2/pile/laminate/3")
+    check, frame = GapCheck(simulator.model), simulator.frame()
+    unit = simulator.scene.contact.barrier_distance
+
+    def seen(pair, height):
+        """With everything moved so that its least gap to the ground is a height."""
+        lowest = check._surface_gaps(check._ribbons.sheet(check.moment(frame).sections), check.moment(frame), math.inf)
+        moved = replace(frame, positions=frame.positions + [0.0, 0.0, height - lowest[0]])
+        return check.floating(check.moment(moved), [pair])
+
+    assert [seen((f"strip{k}", "ground"), 0.9 * unit) for k in range(3)].count("") == 1
+    assert all("touch across" in seen((f"strip{k}", "ground"), 2.0 * unit) for k in range(3))
+    assert seen(("strip0", "strip2"), unit).startswith("strip0 and strip2 touch across")
+
+
 def crossing(name, moved):
     """What is seen when a part of what moves is somewhere else at the next look."""
     simulator = simulator_of(name)
