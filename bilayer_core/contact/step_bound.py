@@ -27,7 +27,7 @@ from __future__ import annotations
 
 import math
 
-from bilayer_core.contact.near import gap_normal, place_of, stands_aside
+from bilayer_core.contact.gap import gap_normal, place_of, stands_aside
 from bilayer_core.contact.shapes import SPHERE
 from bilayer_core.jit import kernel
 from bilayer_core.jit.called import stack_vector

@@ -106,6 +106,8 @@ class Evaluator:
         """Make a configuration that of a state."""
         self._take(state)
         take_state(self.problem, self._arrays, at)
+        if self.problem.surfaces.exists and self.problem.surfaces.divides:
+            self.problem.surfaces.margin[0] = -1.0  # no list serves another state
 
     def _take(self, state: State) -> None:
         self._storage.set_friction(state.friction)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bilayer_core.contact.barrier import barrier_gradient
-from bilayer_core.contact.near import gap_normal, place_of
+from bilayer_core.contact.gap import gap_normal, place_of
 from bilayer_core.forces.bend_twist import bend_by_strains
 from bilayer_core.forces.flattening import pull_of_rest
 from bilayer_core.forces.rail_arms import write_rail_motions

@@ -25,7 +25,7 @@ from __future__ import annotations
 import math
 
 from bilayer_core.contact.barrier import barrier
-from bilayer_core.contact.near import gap_normal
+from bilayer_core.contact.gap import gap_normal
 from bilayer_core.jit import kernel, piece
 from bilayer_core.model.force_slots import slot_of
 from bilayer_core.model.records.contacts import Restitution

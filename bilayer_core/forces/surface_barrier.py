@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 
 from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hessian
-from bilayer_core.contact.near import gap_normal, place_of, stands_aside
+from bilayer_core.contact.gap import gap_normal, place_of, stands_aside
 from bilayer_core.contact.shapes import shape_curvature
 from bilayer_core.forces.contact_on_bodies import add_force, add_second_derivative
 from bilayer_core.forces.restitution import RESTITUTION, damping_at
@@ -127,4 +127,7 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
 @piece(int, Surfaces, Problem, Configuration, Stage)
 def start_surface_barrier(surfaces, p, start, stage):
     """List the pairs that are near at the start of a stage; returns a status."""
+    if surfaces.divides:
+        surfaces.margin[0] = -1.0  # weights are those at the start
+        return list_surface_pairs(surfaces, start, surfaces.d_hat)
     return list_surface_pairs(surfaces, start, 0.0)

@@ -26,10 +26,10 @@ points are one, on the face of the body or rod, x − r n, and so the moments ca
 node and turns with the edges there, by a rate that is frozen with the contact (`forces.rod_arms`). F is positive
 semidefinite.
 
-A station of a rod stands for half an edge on each side. Where the slip of two neighbouring stations that press on a
-plane turns round between them, or close by, their shares of that edge are spread over `PARTS` places of it for the rest
-of the stage: slip is linear between stations, and what rests may be anywhere. A place slips as fast as the next one
-within f₁ of a threshold that is widened to the difference of the two, so that friction is continuous as what rests
+A station of a rod stands for half an edge on each side. Where the slip of two neighbouring stations that press on one
+flat face turns round between them, or close by, their shares of that edge are spread over `PARTS` places of it for the
+rest of the stage: slip is linear between stations, and what rests may be anywhere. A place slips as fast as the next
+one within f₁ of a threshold that is widened to the difference of the two, so that friction is continuous as what rests
 moves along: f₁′ falls linearly to 0 there, and such hats add up to 1. (By stations alone the stride of a strip that
 extends is off by several percent, as its resting point is always a station.)
 
@@ -47,7 +47,7 @@ import math
 
 from bilayer_core.contact.barrier import barrier_gradient
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
-from bilayer_core.contact.near import gap_normal, mix_of, place_of, rod_point
+from bilayer_core.contact.gap import gap_normal, mix_of, place_of, rod_point
 from bilayer_core.contact.shapes import PLANE
 from bilayer_core.forces.contact_on_bodies import add_force, add_second_derivative
 from bilayer_core.forces.restitution import damping_at
@@ -82,6 +82,8 @@ BESIDE = 0.5
 """How far beside an edge slip may turn round for it to have such places, in its own length."""
 ALIKE = 0.25
 """Part of the slip within which a contact sticks by which slips may differ without friction that does."""
+SAME_FACE = 1e-9
+"""Of the cosine between the normals of two contacts on one face: what rounding leaves."""
 SAME_SECTION = 4
 """Contacts of a rod and surface at most from one station to the same place of the next one's section."""
 
@@ -371,6 +373,21 @@ def _next_station(sliding, surfaces, strands, k, count):
 
 
 @kernel
+def _is_whole(surfaces, sliding, k):
+    """Return whether a contact of a rod is of a station that bears all that its edges do."""
+    s, node = sliding.surface[k], sliding.node[k]
+    return surfaces.whole[s, node] if surfaces.node_between[s, node] else surfaces.kind[s] == PLANE
+
+
+@kernel
+def _on_one_face(surfaces, sliding, k, j):
+    """Return whether two contacts with one surface are of such stations, and on the same flat face."""
+    n = sliding.normal
+    along = n[k, 0] * n[j, 0] + n[k, 1] * n[j, 1] + n[k, 2] * n[j, 2]
+    return _is_whole(surfaces, sliding, j) and along > 1.0 - SAME_FACE
+
+
+@kernel
 def _tangential_slip(sliding, p, at, stage, k, arm, lever, slip_out):
     """Write the slip of a contact since the origin of the stage in its tangent plane [m]."""
     _slip(sliding, p.surfaces, p.strands, at, stage, k, arm, lever, slip_out)
@@ -418,12 +435,12 @@ def _spread(sliding, p, at, stage, count):
     for k in range(whole):
         sliding.left[k] = sliding.load[k]
     for k in range(whole):
-        if surfaces.contact_point_body[sliding.first[k]] >= 0 or surfaces.kind[sliding.surface[k]] != PLANE:
-            continue
-        if surfaces.node_between[sliding.surface[k], sliding.node[k]]:
+        if surfaces.contact_point_body[sliding.first[k]] >= 0 or not _is_whole(surfaces, sliding, k):
             continue
         j = _next_station(sliding, surfaces, p.strands, k, whole)
         if j < 0 or count - whole + PARTS > most:
+            continue
+        if surfaces.kind[sliding.surface[k]] != PLANE and not _on_one_face(surfaces, sliding, k, j):
             continue
         _tangential_slip(sliding, p, at, stage, k, arm, lever, u)
         _tangential_slip(sliding, p, at, stage, j, arm, lever, v)

@@ -11,7 +11,7 @@ from bilayer_core.jit import UNALLOCATED
 from bilayer_core.model.colliders import RODS, Collider, colliders, points_can_collide, shapes_can_collide
 from bilayer_core.model.friction_pairs import friction_values
 from bilayer_core.model.model import Model, PlacedBodies
-from bilayer_core.model.points_between import demand_of, strip_area
+from bilayer_core.model.points_between import demand_of, spacing
 from bilayer_core.model.records import contacts
 from bilayer_core.model.records.contacts import Sliding, Surfaces
 from bilayer_core.model.rod_points import RodPoints, rod_points
@@ -93,12 +93,14 @@ def build_contact(
     point_body, moved_by = np.concatenate([np.full(nodes, -1), own, free]), np.concatenate([held_by, own, free])
     section = of_rods.section
     bends = {name: bend_of(scene, rod) for rod in scene.rods for name in rod.copy_names}
-    bent = np.concatenate([np.full(strand.node_count, bends[strand.rod] >= 0.0) for strand in found.strands])
+    radius_of_bend = np.concatenate([np.full(strand.node_count, bends[strand.rod]) for strand in found.strands])
+    bent = radius_of_bend >= 0.0
     bend = min((radius for radius in bends.values() if radius >= 0.0), default=-1.0)
     flat = np.array([surface.shape.kind == "plane" for surface in surfaces], dtype=bool)
     node_between = np.where(flat[:, None], bent, True) & (section[:, 3] > 0.0)
-    demands = [demand_of(surface.shape, strip_area(section), bend) for surface in surfaces]
-    sharpest, least_spacing = np.array(demands).reshape(-1, 2).T
+    sharpest = np.array([demand_of(surface.shape, bend) for surface in surfaces], dtype=float)
+    met = of_nodes[:, used].any(axis=0)
+    divides = any(of and surface.shape.kind in DIVIDING for of, surface in zip(met, surfaces, strict=True))
     dense = bool((sharpest >= 0.0).any())
     arms = np.hypot(section[:, 1], section[:, 2]) if dense else np.linalg.norm(of_rods.arm, axis=1)
     at_edges = node_edges if dense else node_edges[of_rods.node]
@@ -121,7 +123,7 @@ def build_contact(
                 first=nodes + len(others),
                 node=of_rods.node,
                 arm=of_rods.arm,
-                longest=(PARTS_BETWEEN if dense else 1.0) * float(arms.max()),
+                longest=float(arms.max()),
                 node_factor=NODES_BETWEEN if dense else 1.0,
             )
             if len(arms)
@@ -135,8 +137,9 @@ def build_contact(
         edge_can_collide=_of_edges(found, of_sections[:, used]),
         node_between=node_between,
         dense=dense,
-        sharpest=sharpest.copy(),
-        least_spacing=least_spacing.copy(),
+        divides=divides,
+        sharpest=sharpest,
+        coarsest=np.where(bent, spacing(radius_of_bend, section[:, 0], clear), np.inf),
         kind=np.array([NUMBER[s.shape.kind] for s in surfaces], dtype=np.int64),
         size=np.array([s.shape.core for s in surfaces]).reshape(-1, 3),
         rounding=np.array([s.shape.rounding for s in surfaces]),
@@ -165,7 +168,7 @@ def build_contact(
             node_axis=found.column("node_axis", np.int64),
             surface_grain=surface_grain,
             point_grain=point_grain,
-            spreads=bool(flat.any() and not bent.all()),
+            spreads=bool((flat.any() and not bent.all()) or divides),
             **friction_values(scene, law, surface_owner, surface_grain, point_grain),
         ),
         surface_names=tuple(s.collider.name for s in surfaces),
@@ -174,8 +177,8 @@ def build_contact(
     )
 
 
-PARTS_BETWEEN = 2.0
-"""|s_b| + |s_a| of a point between stations at most: beyond the last edge."""
+DIVIDING = ("box", "cylinder")
+"""Shapes that divide rods in lists of near pairs."""
 NODES_BETWEEN = 1.25
 """Sum of the magnitudes of the parts that three nodes have in it, in the middle of an edge, where that is largest."""
 
@@ -192,12 +195,11 @@ def _arm_factor(found: Collected, arm: np.ndarray, edges: np.ndarray, between: b
 
     Its arm [m], shape (n_rod_point,), turns with the edges next to it, shape (n_rod_point, 2), by at most the motion of
     one end against the other over their length, of which half is left at least. If there are points between stations,
-    the factors of `NODES_BETWEEN` and `PARTS_BETWEEN` come to that.
+    the factor of `NODES_BETWEEN` comes to that.
     """
     slope = arm / found.column("rest_length")[edges].min(axis=1)
     turn = arm / found.column("half_width")[edges].min(axis=1)
-    of_nodes, parts = (NODES_BETWEEN, PARTS_BETWEEN) if between else (1.0, 1.0)
-    return float(np.max(of_nodes + parts * (4.0 * slope + turn), initial=1.0))
+    return float(np.max((NODES_BETWEEN if between else 1.0) + 4.0 * slope + turn, initial=1.0))
 
 
 BITS = 62

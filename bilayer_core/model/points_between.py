@@ -1,25 +1,24 @@
-"""Contact points of rods between stations and across the width where a scene starts; `contact.near` has their pattern.
+"""Contact points of rods between stations and across the width where a scene starts.
 
-Kernels make those that are near in each configuration. Checks of a start, which compile nothing, make them here.
+Kernels make those that are near in each configuration, in the pattern of `contact.between_stations`. Checks of a start,
+which compile nothing, make them here. Near edges of boxes and cylinders they take all points that kernels could make.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from bilayer_core.contact.near import SAG
-from bilayer_core.contact.shapes import PLANE, SPHERE
+from bilayer_core.contact.between_stations import SAG
+from bilayer_core.contact.shapes import BOX, CYLINDER, PLANE, SPHERE
 from bilayer_core.kinematics.frame_strains import cross
 from bilayer_core.model.model import Model
+from bilayer_core.model.records.contacts import Surfaces
 from bilayer_core.model.shape_numbers import Shape
 
 Array = np.ndarray
-MOST_ON_FLAT = 500
-"""Points between stations that press on a flat face at a time, at most."""
 
 
 @dataclass(frozen=True)
@@ -35,30 +34,29 @@ class PointsBetween:
     weight: Array
 
 
-def strip_area(section: Array) -> float:
-    """Return the area of all rods together [m²]; `section` as in `Surfaces`."""
-    return float((2.0 * (section[:, 0] + section[:, 1]) * section[:, 3]).sum())
-
-
-def demand_of(shape: Shape, area: float, bend: float) -> tuple[float, float]:
-    """Return the least radius of what is not flat of a shape, of a plane that of rods on it (`bend_of`, −1 if they are
-    met at stations), and the least distance of points [m].
-
-    Points as dense as sharp edges demand would be many on large faces: their distance is such that those of rods of an
-    area [m²] on a face of a box, or on the end of a cylinder, are `MOST_ON_FLAT` at most.
+def demand_of(shape: Shape, bend: float) -> float:
+    """Return the least radius of what is not flat of a shape [m]; of a plane that of rods on it (`bend_of`, −1 if they
+    are met at stations).
     """
-    if shape.kind == "plane":
-        return bend, 0.0
-    a, b, c = shape.core
-    flat = 4.0 * max(a * b, b * c, c * a) if shape.kind == "box" else np.pi * a * b
-    return shape.rounding, math.sqrt(min(flat, area) / MOST_ON_FLAT)
+    return bend if shape.kind == "plane" else shape.rounding
 
 
-def spacing(demand: tuple[float, float], radius: float, distance: float) -> float:
-    """Return the distance of points that a demand makes of a rod with half the thickness `radius` [m]; `distance` is
-    that of the barrier.
+def spacing(sharpest: Array | float, radius: Array | float, distance: float) -> Array:
+    """Return the distance of points where a surface has the radius `sharpest`, of a rod with half the thickness
+    `radius` [m]; `distance` is that of the barrier.
     """
-    return max(math.sqrt(4.0 * (demand[0] + radius) * SAG * distance), demand[1])
+    return np.sqrt(np.maximum(4.0 * (sharpest + radius) * SAG * distance, 0.0))
+
+
+def _faces_one(surfaces: Surfaces, s: int, x: Array, reach: Array) -> Array:
+    """Return whether all within `reach` [m] of points of the surface's frame, shape (n, 3), is before one flat face of
+    it, shape (n,).
+    """
+    kind, size = int(surfaces.kind[s]), surfaces.size[s]
+    if kind == BOX:
+        return (np.abs(x) - size > -reach[:, None]).sum(axis=1) == 1
+    flat = np.hypot(x[:, 0], x[:, 1]) <= size[0] - reach if kind == CYLINDER else np.zeros(len(x), dtype=bool)
+    return flat | (kind == PLANE)
 
 
 def points_between(model: Model, s: int, centre: Array, within: float) -> Iterator[PointsBetween]:
@@ -73,18 +71,23 @@ def points_between(model: Model, s: int, centre: Array, within: float) -> Iterat
     m2 = cross(edge / np.linalg.norm(edge, axis=1)[:, None], m1)
     edges, section, meets = surfaces.node_edges, surfaces.section, surfaces.edge_can_collide[s]
     is_end = (edges[:, 0] == edges[:, 1]) & (section[:, 3] > 0.0)
-    reach = within + surfaces.bound[s] + section[:, 0] + 1.25 * np.linalg.norm(edge, axis=1)[edges].max(axis=1)
-    reach += surfaces.rod_points.longest
-    flat = surfaces.kind[s] == PLANE
-    is_near = flat | (np.linalg.norm(x - centre, axis=1) < reach)
+    longest = np.linalg.norm(edge, axis=1)[edges].max(axis=1)
+    reach = 1.25 * longest + surfaces.rod_points.longest
+    owner = np.concatenate([model.bodies.start_rotation, np.eye(3)[None]])[surfaces.body[s]]
+    one_face = _faces_one(surfaces, s, (x - centre) @ (owner @ surfaces.rotation[s]), reach)
+    one_face &= (surfaces.kind[s] == PLANE) | (longest <= surfaces.coarsest)
+    is_plane = surfaces.kind[s] == PLANE
+    is_near = is_plane | (np.linalg.norm(x - centre, axis=1) < within + surfaces.bound[s] + section[:, 0] + reach)
     for i in np.flatnonzero(meets[edges].any(axis=1) & surfaces.node_between[s] & is_near).tolist():
         (b, a), single = edges[i], False
         if is_end[i]:
             single = surfaces.node_part[i, 1] == 1.0 and bool(is_end[i + 1])
             if not single:
                 continue
-        apart = spacing((surfaces.sharpest[s], surfaces.least_spacing[s]), section[i, 0], surfaces.d_hat)
-        parts = 2 * int(np.ceil(0.5 * (surfaces.edge_length[[b, a]].max() / apart - 1.0))) + 1
+        flat, apart = one_face[i], spacing(surfaces.sharpest[s], section[i, 0], surfaces.d_hat)
+        if flat and not is_plane:
+            apart = np.inf
+        parts = 2 * max(int(np.ceil(0.5 * (surfaces.edge_length[[b, a]].max() / apart - 1.0))), 0) + 1
         before = 0 if single or not meets[b] else parts if is_end[i - 1] else parts // 2
         after = 0 if not meets[a] else parts if is_end[i + 1] else parts // 2
         j = np.arange(-before, after + 1)
@@ -94,8 +97,8 @@ def points_between(model: Model, s: int, centre: Array, within: float) -> Iterat
             j = j[(np.abs(j) == parts) | (j == 0) | (2 * np.abs(j) < (0 if single else parts))]
         part, aside = j / parts, np.abs(j)[:, None] / parts
         radius, border, height = (section[i, :3] + aside * (section[i + np.sign(j), :3] - section[i, :3])).T
-        along = np.stack([0.5 * (part - part**2), 0.5 * (part + part**2)], axis=1)
-        shares, weight = np.stack([0.5 - part, 0.5 + part], axis=1), surfaces.edge_length[np.where(j < 0, b, a)]
+        along, after = np.stack([0.5 * (part - part**2), 0.5 * (part + part**2)], axis=1), np.clip(0.5 + part, 0.0, 1.0)
+        shares, weight = np.stack([1.0 - after, after], axis=1), surfaces.edge_length[np.where(j < 0, b, a)]
         weight = np.where(j == 0, surfaces.edge_length[[b, a]].mean(), weight)
         of_end = (np.abs(j) == parts) | (single & (j == 0))
         weight = weight * np.where(of_end, 0.5, 1.0) / np.where(of_end & flat, 1, parts)

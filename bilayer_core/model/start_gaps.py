@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -69,12 +70,15 @@ def surface_gaps(model: Model, within: float) -> Iterator[SurfaceGaps]:
         meets = surfaces.can_collide[s][surfaces.group]
         weight = np.where(of_rods & surfaces.node_between[s][node], 0.0, surfaces.weight)
         parts = [(everything[meets], position[meets], surfaces.radius[meets], weight[meets])]
-        for cell in points_between(model, s, origin, within):
-            parts.append((np.full(len(cell.radius), cell.node), cell.place, cell.radius, cell.weight))
-        point, place, radius, weight = (np.concatenate(of_all) for of_all in zip(*parts, strict=True))
-        gap = signed_distance(core, place - origin) - surfaces.rounding[s] - radius
-        near = gap < within
-        yield SurfaceGaps(s, point[near], gap[near], weight[near], place[near])
+        cells = points_between(model, s, origin, within)
+        found = []
+        for point, place, radius, share in chain(
+            parts, ((np.full(len(cell.radius), cell.node), cell.place, cell.radius, cell.weight) for cell in cells)
+        ):
+            gap = signed_distance(core, place - origin) - surfaces.rounding[s] - radius
+            near = gap < within
+            found.append((point[near], gap[near], share[near], place[near]))
+        yield SurfaceGaps(s, *(np.concatenate(of_all) for of_all in zip(*found, strict=True)))
 
 
 def rod_gaps(model: Model, within: float) -> RodGaps:

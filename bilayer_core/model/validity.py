@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import inf
 
-from bilayer_core.contact.near import SAG
+from bilayer_core.contact.between_stations import SAG
 from bilayer_core.model.diffusion_times import diffusion_figures
 from bilayer_core.model.edge_figures import EdgeFigures, edge_figures
 from bilayer_core.model.findings import Figure
-from bilayer_core.model.points_between import demand_of, spacing
-from bilayer_core.model.shape_numbers import shape_of
 from bilayer_core.model.strip_choice import plate_figures
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.rod import Rod
@@ -36,8 +34,6 @@ def validity_figures(scene: SceneConfig) -> Iterator[Figure]:
         thinnest[rod.name] = at_edges.thickness.min()
         yield from _of_section(scene, rod, at_edges)
         yield from diffusion_figures(scene, rod)
-        if scene.contact is not None:
-            yield from _of_points(scene, rod, at_edges)
     if scene.contact is not None:
         yield _of_barrier(*min(thinnest.items(), key=lambda item: item[1]), scene.contact.barrier_distance)
 
@@ -125,29 +121,3 @@ def bend_of(scene: SceneConfig, rod: Rod) -> float:
     curvature = edge_figures(scene, rod).curvature()
     largest = float(curvature[curvature * rod.edge_length**2 > deepest].max(initial=0.0))
     return 1.0 / largest if largest > 0.0 else -1.0
-
-
-def _of_points(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
-    """Return how far apart a rod's contact points are for the surface that may sink deepest between them."""
-    shaped = [(body.name, body.surface) for body in scene.bodies if body.surface is not None]
-    shaped += [(obstacle.name, obstacle) for obstacle in scene.obstacles]
-    radius, distance, worst = 0.5 * float(at_edges.thickness.min()), scene.contact.barrier_distance, None
-    area, bend = float(at_edges.width.max()) * rod.path.length, bend_of(scene, rod)
-    for name, surface in shaped:
-        demand = demand_of(shape_of(surface), area, bend)
-        if demand[0] < 0.0:  # a plane that meets stations
-            continue
-        apart = spacing(demand, radius, distance)
-        sag = apart**2 / (4.0 * (demand[0] + radius))
-        if worst is None or sag > worst[0]:
-            worst = sag, apart, name
-    if worst is not None:
-        sag, apart, name = worst
-        yield Figure(
-            f"rods.{rod.name}",
-            f"contact points that meet {name} are at most",
-            f"{1e3 * apart:.2g} mm apart, between which it sinks by {1e3 * sag:.2g} mm",
-            f"at most {1e3 * distance:g} mm, the barrier distance",
-            sag / distance,
-            "its edges come into the rod between them: round them, or make its faces smaller" if sag > distance else "",
-        )

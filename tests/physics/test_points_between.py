@@ -6,7 +6,7 @@ from scipy.interpolate import CubicSpline
 from support.sample_scenes import contact, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.contact.near import SAG
+from bilayer_core.contact.between_stations import SAG
 from bilayer_core.errors import PenetrationError
 from bilayer_core.model.points_between import points_between
 

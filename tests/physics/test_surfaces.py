@@ -7,7 +7,8 @@ from support.records_by_hand import record_of
 from support.sample_scenes import HALF_SIZES, contact, layer, rod, scene
 
 from bilayer_core import load_scene
-from bilayer_core.contact.near import gap_normal, list_near
+from bilayer_core.contact.gap import gap_normal
+from bilayer_core.contact.near import list_near
 from bilayer_core.contact.step_bound import KEPT_FRACTION, motion_of_points, step_bound
 from bilayer_core.jit import piece
 from bilayer_core.kinematics.rotation import rotation_matrix

@@ -42,11 +42,6 @@ def test_a_slender_rod_of_small_strain_has_no_warning_and_all_its_figures_are_to
         assert text in told
 
 
-def stone(rounding):
-    """A box whose faces are larger than a rod."""
-    return {"name": "stone", "type": "box", "position": [0, 0, -0.1], "size": [0.1, 0.1, 0.1], "rounding": rounding}
-
-
 def bent_by_nature(width):
     """A strip of one layer, 1 mm thick, that is curved by 5 1/m at rest."""
     return scene([rod([layer(thickness=1e-3, natural_curvature=5.0)], length=0.3, width=width, stations=51)])
@@ -90,12 +85,6 @@ CASES = {
         bilayer(contact=contact(barrier_distance=0.49e-3)),
         bilayer(contact=contact(barrier_distance=0.51e-3)),
         "contact.barrier_distance: 0.51 mm is 0.51 of the least thickness, that of rods.rod (at most 0.5): surfaces",
-    ),
-    "sharp edges": (
-        bilayer(contact=contact(barrier_distance=1e-4), obstacles=[stone(1.6e-3)]),
-        bilayer(contact=contact(barrier_distance=1e-4), obstacles=[stone(1.4e-3)]),
-        "rods.rod: contact points that meet stone are at most 0.89 mm apart, between which it sinks by 0.11 mm (at "
-        "most 0.1 mm, the barrier distance): its edges come",
     ),
 }
 

@@ -13,7 +13,7 @@ class RodPoints:
     first: int  # of them among contact points
     node: Indices  # ascending, shape (n_rod_point,)
     arm: Matrix  # along m1 and m2, means of the node's edges [m], shape (n_rod_point, 2)
-    longest: float  # of all arms, times the sum of both parts [m]
+    longest: float  # of all arms [m]
     node_factor: float  # how much farther than nodes a point of their curve moves at most
 
 
@@ -56,8 +56,9 @@ class Surfaces:
     edge_can_collide: FlagTable  # whether what is between two can, shape (n_surface, n_edge)
     node_between: FlagTable  # whether points beside a station meet it, shape (n_surface, n_node)
     dense: bool  # whether points between stations meet one
+    divides: bool  # whether one has faces and edges, for which lists divide rods; see `contact.between_stations`
     sharpest: Vector  # least radius of what is not flat, −1 if all is [m], shape (n_surface,)
-    least_spacing: Vector  # of points between stations [m], shape (n_surface,)
+    coarsest: Vector  # distance of points along bent rods, infinite where one is straight [m], shape (n_node,)
     edge_can_cross: FlagTable  # whether it could come between the nodes of an edge, shape (n_surface, n_edge)
     near_contact_point: Indices = ("near",)
     near_surface: Indices = ("near",)
@@ -67,6 +68,7 @@ class Surfaces:
     near_mix: Matrix = ("near", 6)  # of its edges; see `contact.near`
     near_radius: Vector = ("near",)  # [m]
     near_weight: Vector = ("near",)  # Δl of the barrier [m]
+    whole: FlagTable = ("surface", "node")  # whether a station bears all that its edges do, though they may have parts
     near_count: Indices = (1,)
     margin: Vector  # shape (1,)
     extent: Vector = ("surface",)
@@ -110,7 +112,7 @@ class Sliding:
     world_axis: Vector  # 0 without one, shape (3,)
     surface_grain: Matrix  # forward direction on each in its body's frame, 0 without one, shape (n_surface, 3)
     point_grain: Matrix  # likewise of contact points, shape (n_contact_point, 3)
-    spreads: bool  # whether a surface is a plane, on which stations spread their loads where slip turns round
+    spreads: bool  # whether a surface has a flat face, on which stations spread their loads where slip turns round
     mu: Matrix = ("slide", 3)  # coefficients of contacts: forward, backward, sideways
     count: Indices = (1,)
     places: Indices = (1,)  # how many of them are places of edges

@@ -208,8 +208,10 @@ STRAIN, STRIP = 0.05, 0.1
 """How much a crawling strip extends, and its length [m]."""
 
 
-def stride(forward: float, backward: float, stations: int) -> tuple[float, float]:
-    """Return the way of the middle of a strip [mm] that extends evenly and goes back.
+def stride(
+    forward: float, backward: float, stations: int, ground: dict = GROUND, dimension: int | str = "auto"
+) -> tuple[float, float]:
+    """Return the way of the middle of a strip [mm] that extends evenly and goes back, and what it must be.
 
     It rests where the friction of what slides backward and of what slides forward are equal: at the part
     μ₊/(μ₊ + μ₋) of its length as it extends, and at 1 minus that as it goes back. So it advances by ε L times the
@@ -223,13 +225,13 @@ def stride(forward: float, backward: float, stations: int) -> tuple[float, float
         materials={"film": {"youngs_modulus": 1e9, "poisson_ratio": 0.5, "density": 1000.0}},
         gravity=[0, 0, -GRAVITY],
         stimuli={"pulse": {"schedule": {"type": "table", "times": [0, 1, 2], "values": [0, 1, 0]}}},
-        obstacles=[GROUND],
+        obstacles=[ground],
         contact=law,
         start="settle",
         duration=2.2,
     )
     content["solver"] = {}
-    simulator = Simulator(load_scene(content))
+    simulator = Simulator(load_scene(content), dimension=dimension)
     simulator.run()
     middle = simulator.rods["rod"].positions[stations // 2, 0] - 0.5 * STRIP
     return 1e3 * float(middle), 1e3 * STRAIN * STRIP * (backward - forward) / (backward + forward)
