@@ -151,7 +151,7 @@ def _light(channel) -> str:
 
 def _friction(scene, part, axis: str) -> str:
     """Return the coefficients of a part's own, or those along an axis if it has one, as the rest of a sentence."""
-    law, own = scene.contact.friction if scene.contact is not None else None, part.friction
+    law, own = scene.friction, part.friction
     holds = law if own is None else own
     if own is None and not (axis and law is not None and law.acts):
         return ""
@@ -163,7 +163,7 @@ def _friction(scene, part, axis: str) -> str:
 
 def _axis(scene, surface) -> str:
     """Return the direction by which friction on a surface differs; empty without one."""
-    law = scene.contact.friction if scene.contact is not None else None
+    law = scene.friction
     if surface is not None and surface.grain is not None:
         return f"its grain, {_vector(surface.grain)} in its frame"
     return f"{_vector(law.axis)} in the world" if surface is not None and law is not None and law.axis else ""

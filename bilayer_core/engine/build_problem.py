@@ -83,10 +83,7 @@ def restitution_of(model: Model, sizes: dict[str, int]) -> Restitution:
 
 def slips_of(model: Model, sizes: dict[str, int]) -> Slips:
     """Return the record of slips, absent if nothing slides against friction."""
-    law = model.scene.contact.friction if model.scene.contact else None
-    if not slides(model.scene, law):
-        return Slips.absent()
-    return Slips.zeros(sizes)
+    return Slips.zeros(sizes) if slides(model.scene, model.scene.friction) else Slips.absent()
 
 
 def rod_contact_of(

@@ -170,10 +170,7 @@ class Storage:
 
     def take_scene(self, model: Model) -> None:
         """Take another scene of the same model, whose coefficients of friction may be others."""
-        before, law = (
-            friction_law(of.scene, of.forces, self._friction) if of.scene.contact else None
-            for of in (self._model, model)
-        )
+        before, law = (friction_law(of.scene, of.forces, self._friction) for of in (self._model, model))
         self._model = model
         if law != before and self._problem is not None:
             self._problem = self._make()

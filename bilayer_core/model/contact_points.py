@@ -158,7 +158,6 @@ def build_contact(
     rod_of_node = np.concatenate([np.full(s.node_count, rod_number[s.rod], dtype=np.int64) for s in found.strands])
     owner_of_others = np.array([len(scene.rods) + p.collider.order for p in others], dtype=np.int64)
     surface_owner = np.array([len(scene.rods) + s.collider.order for s in surfaces], dtype=np.int64)
-    law = contact.friction if contact is not None else None
     return dict(
         surfaces=record,
         sliding=Sliding.zeros(
@@ -169,7 +168,7 @@ def build_contact(
             surface_grain=surface_grain,
             point_grain=point_grain,
             spreads=bool((flat.any() and not bent.all()) or divides),
-            **friction_values(scene, law, surface_owner, surface_grain, point_grain),
+            **friction_values(scene, scene.friction, surface_owner, surface_grain, point_grain),
         ),
         surface_names=tuple(s.collider.name for s in surfaces),
         point_count=len(shown),

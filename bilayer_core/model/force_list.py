@@ -144,7 +144,7 @@ def _added_mass(q: Question) -> str | None:
 def _friction(q: Question) -> str | None:
     if not q.pairs:
         return "no surfaces that can meet"
-    return _unless(slides(q.scene, q.scene.contact.friction), "no friction coefficient above zero")
+    return _unless(slides(q.scene, q.scene.friction), "no friction coefficient above zero")
 
 
 def _restitution(q: Question) -> str | None:
@@ -175,7 +175,7 @@ def _rod_barrier(q: Question) -> str | None:
 def _rod_friction(q: Question) -> str | None:
     if not q.rods_touch:
         return _rod_barrier(q)
-    coefficient = friction_of_rods(q.scene, q.scene.contact.friction)
+    coefficient = friction_of_rods(q.scene, q.scene.friction)
     return _unless(coefficient.max() > 0.0, "no friction coefficient above zero")
 
 

@@ -172,7 +172,7 @@ class _Survey:
     def _friction_axes(self) -> Iterator[tuple[str, Array]]:
         """Yield the directions by which friction differs, in the world at the start."""
         scene = self._scene
-        law = scene.contact.friction if scene.contact is not None else None
+        law = scene.friction
         if law is not None and law.axis is not None:
             yield "contact.friction.axis", np.array(law.axis)
         for body in scene.bodies:

@@ -34,7 +34,7 @@ def friction_law(scene: SceneConfig, forces: tuple[str, ...], given: Array) -> F
 
     Keys that the scene leaves out go with `coefficient`.
     """
-    law = scene.contact.friction if scene.contact is not None else None
+    law = scene.friction
     if not acts(forces):
         return law
     from_outside = {key: value for key, value in zip(COEFFICIENTS, given.tolist(), strict=True) if value != OF_SCENE}

@@ -14,10 +14,9 @@ from bilayer_core.scene.config import SceneConfig
 
 def unseen_vibrations(scene: SceneConfig) -> tuple[str, ...]:
     """Return what all runs in steps of about the same length may miss, each with a remedy; none where nothing rubs."""
-    law = scene.contact.friction if scene.contact is not None else None
     used = dict.fromkeys(layer.material for rod in scene.rods for layer in rod.layers)
     undamped = [name for name in used if scene.materials[name].retardation_time == 0.0]
-    if not slides(scene, law) or not undamped:
+    if not slides(scene, scene.friction) or not undamped:
         return ()
     keys = ", ".join(f"materials.{name}.retardation_time" for name in undamped)
     return (

@@ -27,6 +27,7 @@ class SceneConfig(Protocol):
     stimuli: dict
     fluid: object
     contact: Any
+    friction: Any
 
 
 def faults_of_scene(scene: SceneConfig) -> list[Fault]:
@@ -98,7 +99,7 @@ def _drags(scene: SceneConfig) -> Iterator[Fault]:
 
 def _frictions(scene: SceneConfig) -> Iterator[Fault]:
     """Yield a fault for coefficients of a part's own that lack what `contact.friction` says, or a direction."""
-    law = scene.contact.friction if scene.contact is not None else None
+    law = scene.friction
     grains = {"bodies": [body.surface and body.surface.grain for body in scene.bodies]}
     grains["obstacles"] = [obstacle.grain for obstacle in scene.obstacles]
     for key in ("rods", "bodies", "obstacles"):

@@ -272,6 +272,11 @@ class SceneConfig(Part):
     output: Output = Output()
     """What logs and topics hold how often."""
 
+    @property
+    def friction(self) -> Friction | None:
+        """Law of friction of all that touches; None without contact, or where nothing rubs."""
+        return self.contact.friction if self.contact is not None else None
+
     def __repr__(self) -> str:
         counts = f"{len(self.rods)} rods, {len(self.bodies)} bodies, {len(self.obstacles)} obstacles"
         channels = ", ".join(self.stimuli) or "none"

@@ -33,14 +33,14 @@ def refuse_friction(model: Model, value: float | None, key: str) -> None:
     if key not in COEFFICIENTS:
         raise InputError(f"{what}: no such coefficient; there are: {', '.join(COEFFICIENTS)}")
     if not acts(model.forces):
-        law = scene.contact.friction if scene.contact is not None else None
+        law = scene.friction
         why = "no contact.friction" if law is None else "no coefficient above zero" if not law.acts else "no contact"
         raise InputError(
             f"{what}: nothing slides against friction in the scene {scene.name!r}, which has {why}; allowed is a "
             "change where surfaces can meet and contact.friction has a coefficient above 0"
         )
     sliding, rods = model.sliding, ROD_FRICTION in model.forces
-    if not heeds(scene, scene.contact.friction, key, sliding.owner, sliding.surface_owner, rods):
+    if not heeds(scene, scene.friction, key, sliding.owner, sliding.surface_owner, rods):
         raise InputError(
             f"{what}: it holds between no two parts of the scene {scene.name!r}: they have friction of their own, or "
             "no such direction; allowed are coefficients of `contact.friction` that hold somewhere"

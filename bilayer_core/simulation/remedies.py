@@ -94,7 +94,7 @@ def remedy(
         if needed <= LARGEST_TOLERANCE:
             return _set("solver.tolerance", f"{needed:.1g}")
         return Remedy("let what acts on the robot grow over a time instead of at once")
-    friction = scene.contact.friction if scene.contact is not None else None
+    friction = scene.friction
     if friction is not None and friction.speed_threshold < MUCH_FASTER * steps.newton_tolerance:
         needed = rounded_up(MUCH_FASTER * steps.newton_tolerance)
         return _set("contact.friction.speed_threshold", f"{needed:.1g}", "m/s")
