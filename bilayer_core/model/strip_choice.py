@@ -86,7 +86,7 @@ def section_of(scene: SceneConfig, rod: Rod) -> str:
     by more than `MOST` and can be computed.
     """
     if rod.section != "auto":
-        return rod.section
+        return rod.section or "beam"
     if scene.solver.model == "two_rod" or scene.coupling != Coupling():
         return "beam"
     if rod.radius is not None:
@@ -109,6 +109,12 @@ def folding_ratio(poisson: float) -> float:
     return high
 
 
+def plates(scene: SceneConfig) -> Iterator[Figure]:
+    """Yield how strips as wide as the rods of a scene differ from beams."""
+    for rod in scene.rods:
+        yield from plate_figures(scene, rod, edge_figures(scene, rod))
+
+
 def plate_figures(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
     """Yield how a strip as wide as a rod differs from a beam, and, of a strip, when it may fold and how high its
     section rises.
@@ -116,11 +122,12 @@ def plate_figures(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterat
     if rod.radius is not None:
         return
     where, found, strip = f"rods.{rod.name}", departure(rod, at_edges), section_of(scene, rod) == "strip"
-    change, stiffer = found.of_curvature, found.of_stiffness
+    change, stiffer, told = found.of_curvature, found.of_stiffness, strip or rod.section == "beam"
+    allowed = f"`section: {rod.section}`" if told else f"at most {100 * PLATE:g} %"
     if found.swollen > 0.0:
         outside = (
             "its section bends as well; that of a beam does not: give it `section: strip`, or, if its layers swell "
-            "along it alone, `swelling: along`"
+            "along it alone, `swelling: along`, or `section: beam`, if a beam is meant"
         )
         yield Figure(
             where,
@@ -128,9 +135,9 @@ def plate_figures(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterat
             f"{'curls' if strip else 'would curl'}",
             f"{100 * abs(change):.2g} % {'less' if change < 0.0 else 'more'} than "
             f"{'a beam' if strip else 'computed'} (w²κ/H {found.swollen:.2g})",
-            "computed so" if strip else f"at most {100 * PLATE:g} %",
+            allowed,
             abs(change) / PLATE,
-            outside if abs(change) > PLATE and not strip else "",
+            outside if abs(change) > PLATE and not told else "",
         )
     if found.curved > 0.0:
         yield Figure(
@@ -138,9 +145,9 @@ def plate_figures(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterat
             f"a {'strip' if strip else 'plate'} as wide and curved {'is' if strip else 'would be'} "
             "stiffer in bending by",
             f"{100 * stiffer:.2g} % (w²κ/H {found.curved:.2g})",
-            "computed so" if strip else f"at most {100 * PLATE:g} %",
+            allowed,
             stiffer / PLATE,
-            "its section keeps its shape; that of a beam bends freely" if stiffer > PLATE and not strip else "",
+            "its section keeps its shape; that of a beam bends freely" if stiffer > PLATE and not told else "",
         )
     if not strip:
         return

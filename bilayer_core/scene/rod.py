@@ -115,9 +115,10 @@ class Rod(Part):
     """Bottom first."""
     diffusion: Diffusions = []
     """Of moisture or heat through the layers; one field or several. Layers without one follow with their lags."""
-    section: Literal["beam", "strip", "auto"] = "beam"
+    section: Literal["beam", "strip", "auto"] | None = None
     """`beam`: the section keeps its shape, right for w²κ/H below about 1; `strip`: it curls across the width, of any
-    width; `auto`: `strip` where curvature or stiffness would differ by more than 1 %.
+    width; `auto`: `strip` where curvature or stiffness would differ by more than 1 %. A beam by default, with a warning
+    where a strip would differ by more than 5 %.
     """
     torsion: Literal["laminate", "layers"] = "laminate"
     """Torsional stiffness: of the bonded section, or the sum of the layers' own."""

@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 
 from bilayer_core.engine.energy_account import LARGEST, NUMERICAL
+from bilayer_core.model.findings import told
 from bilayer_core.model.impacts import heaviest, stiffness_that_holds
 from bilayer_core.model.model import Model
+from bilayer_core.model.strip_choice import plates
 from bilayer_core.model.undamped_friction import unseen_vibrations
 from bilayer_core.model.validity import LARGE_STRAIN, THICK_CURVATURE
 from bilayer_core.observed.system import versions
@@ -107,6 +109,7 @@ def summarise(simulator: Any) -> dict:
         },
         "warnings": [
             *simulator.start_warnings,
+            *told(figure for figure in plates(simulator.scene) if figure.outside),
             *_warnings(statistics, numerical, through, simulator.plane_watch),
             *_of_contact(model, statistics.unresolved, largest),
             *folded(model, simulator._state),

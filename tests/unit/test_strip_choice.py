@@ -8,14 +8,14 @@ from support.sample_scenes import GROUND, contact, layer, rod, scene
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SceneError
 from bilayer_core.model.edge_figures import edge_figures
-from bilayer_core.model.strip_choice import departure, folding_ratio, section_of
+from bilayer_core.model.strip_choice import departure, folding_ratio, plates, section_of
 from bilayer_core.model.validity import validity_figures
 
 HEAT = {"heat": {"schedule": {"type": "hold", "value": 1}}}
 
 
 def wide(section="auto", width=0.03, gain=0.006667, swelling="isotropic", more=None, **content):
-    """A bilayer of 0.5 mm like that of `shared/inputs/wide.yaml`, w²κ/H 36."""
+    """A bilayer of 0.5 mm that is as wide as 60 times that, w²κ/H 36."""
     law = {"stimulus": "heat", "gain": gain}
     layers = [layer("p", 0.25e-3), layer("q", 0.25e-3, eigenstrain=law, swelling=swelling) | (more or {})]
     return scene([rod(layers, 0.2, 41, width=width, section=section)], {"model": "auto"}, stimuli=HEAT, **content)
@@ -106,3 +106,13 @@ def test_a_beam_whose_layers_swell_along_it_alone_is_told_its_stiffness_and_no_c
     told = [figure.what for figure in validity_figures(load_scene(wide("beam", swelling="along")))]
     assert "a plate as wide and curved would be stiffer in bending by" in told
     assert not any("swelling alike" in what for what in told)
+
+
+@pytest.mark.parametrize(("how", "warned"), [({}, True), ({"section": "beam"}, False), ({"section": "strip"}, False)])
+def test_a_run_warns_of_a_wide_rod_whose_section_nobody_chose(how, warned):
+    simulator = Simulator(load_scene(wide(**{"section": None} | how)))
+    simulator.run(1e-3)
+    told = " ".join(simulator.summary()["warnings"])
+    assert ("would curl" in told and "`section: strip`" in told) == warned
+    figure = next(figure for figure in plates(simulator.scene) if "swelling alike" in figure.line(figure.where))
+    assert bool(figure.outside) == warned
