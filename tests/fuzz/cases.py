@@ -320,5 +320,5 @@ def overrides(draw) -> Case:
     return Case(written(mutator.scene), tuple(given), draw(st.booleans()))
 
 
-FAMILIES = {"values": (hostile, 0.35), "keys": (valid_keys, 0.4), "texts": (texts, 0.1), "overrides": (overrides, 0.15)}
+FAMILIES = {"values": (hostile, 0.3), "keys": (valid_keys, 0.35), "texts": (texts, 0.2), "overrides": (overrides, 0.15)}
 """Strategies, each with its share of the scenes."""

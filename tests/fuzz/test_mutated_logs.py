@@ -66,7 +66,7 @@ def fault_of(arguments: list[str], path: Path) -> tuple[int, str]:
         return code, f"took {seconds:.1f} s"
     if shown:
         return code, f"shows what a terminal obeys: {shown[0][:200]!r}"
-    if code in (DONE, STOPPED) or (code == DIFFERS and arguments[0] == "replay"):
+    if code in (DONE, STOPPED) or (code == DIFFERS and arguments[0] in ("replay", "compare")):
         return code, "internal error" if "internal error" in said else ""
     lines = said.splitlines()
     if code != REFUSED or not lines or not lines[0].startswith("bilayer: "):

@@ -46,8 +46,8 @@ PYTHON = re.compile(r"Traceback|\b[A-Z][A-Za-z]*(Error|Exception|Warning)\b|<cla
 """What users are not to read."""
 ORIGIN = re.compile(r"(scene\.yaml(:\d+:\d+)?( with .*?)?|override .*?|[A-Za-z][A-Za-z0-9_]*): \S")
 """What a line of a refusal begins with: file, override, or the name of a scene."""
-ENDLESS = ("law_saturation", "bound", "rod_length")
-"""Arrays of a model that may hold infinity: laws without saturation, planes, closed rods."""
+ENDLESS = ("law_saturation", "bound", "rod_length", "coarsest")
+"""Arrays of a model that may hold infinity: laws without saturation, planes, closed rods, straight ones."""
 ACCEPTED, REFUSED, FAILED = "accepted", "refused", "failed"
 
 

@@ -124,5 +124,5 @@ def test_copies_built_at_once_are_those_built_one_by_one_bit_for_bit(model, kind
     assert at_once.keys() == one_by_one.keys() and len(at_once[".drives[0].driven_edge[0]"]) > 0
     differing = {name for name in at_once if at_once[name].tobytes() != one_by_one[name].tobytes()}
     assert ".drives[0].law_gain[0]" in differing
-    of_laws = tuple(f".drives[0].{name}" for name in ("law_", "driven_law", "driven_joint_law"))
+    of_laws = tuple(f".drives[0].{name}" for name in ("law_", "field_", "mode_", "driven_law", "driven_joint_law"))
     assert {name for name in differing if not name.startswith(of_laws)} == set()
