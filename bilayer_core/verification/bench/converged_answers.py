@@ -92,12 +92,15 @@ def sharp(problem: str, models: Iterable[str]) -> bool:
 
 def fingerprint(problem: Problem) -> str:
     """Return a hash of everything that a reference depends on: the scene file without its title, description and solver
-    settings, the changes, the duration and the measure.
+    settings, the changes, the duration and the measure. A rod that says nothing of its section is a beam.
     """
     path = bundled_scene(problem.scene)
     scene = read_yaml(read_scene_file(path), str(path))
     for key in ("title", "description", "solver"):
         scene.pop(key, None)
+    for rod in scene["rods"]:
+        if rod.get("section") == "beam":
+            del rod["section"]
     measure = {key: value for key, value in vars(problem.measure).items() if not callable(value)}
     measure.pop("stops", None)
     content = [scene, problem.changes, problem.duration, measure]
