@@ -42,7 +42,7 @@ def test_auto_is_a_strip_where_a_beam_would_be_off_by_more_than_1_percent(how, s
     assert chosen(**how) == section
 
 
-def test_check_says_by_how_much_a_strip_differs_when_it_folds_and_how_high_its_section_rises():
+def test_check_says_how_a_strip_differs_when_it_folds_and_how_high_it_rises():
     loaded = load_scene(wide(contact=contact(2e-4), obstacles=[GROUND | {"point": [0, 0, -1]}]))
     told = {figure.what: str(figure) for figure in validity_figures(loaded)}
     assert "curls 38 % more than a beam (w²κ/H 36)" in told["a strip as wide, swelling alike in all directions, curls"]
