@@ -131,17 +131,14 @@ def list_between(surfaces, at, s, limit, pending, count):
         flat = longest <= surfaces.coarsest[i] and _faces_one(
             surfaces, s, p0, p1, p2, 1.25 * longest + surfaces.rod_points.longest
         )
-        length = 0.5 * surfaces.edge_length[b]
-        if ends_before:
-            count = _list_stretch(surfaces, at, s, i, single, -1.0, 1.0, length, flat, limit, pending, count)
-        length = 0.5 * surfaces.edge_length[a]
-        if single:
-            count = _list_stretch(surfaces, at, s, i, single, 0.0, 1.0, length, flat, limit, pending, count)
-        else:
-            whole = 0.5 * (surfaces.edge_length[b] + surfaces.edge_length[a])
-            count = _list_stretch(surfaces, at, s, i, single, 0.0, 0.0, whole, flat, limit, pending, count)
-        if ends_after:
-            count = _list_stretch(surfaces, at, s, i, single, 1.0, -1.0, length, flat, limit, pending, count)
+        before, after = 0.5 * surfaces.edge_length[b], 0.5 * surfaces.edge_length[a]
+        for stretch in range(-1 if ends_before else 0, 2 if ends_after else 1):  # about the station; from ends inward
+            middle, inward, weight = 1.0 * stretch, -1.0 * stretch, before if stretch < 0 else after
+            if stretch == 0 and single:
+                inward = 1.0
+            elif stretch == 0:
+                weight = before + after
+            count = _list_stretch(surfaces, at, s, i, single, middle, inward, weight, flat, limit, pending, count)
     return count
 
 
@@ -267,17 +264,32 @@ def _list_stretch(surfaces, at, s, i, single, middle, inward, weight, flat, limi
     while top > 0:
         top -= 1
         c, e, inward, left = pending[top, 0], pending[top, 1], pending[top, 2], pending[top, 3]
-        mix, radius = _section_at(surfaces, i, c, single)
-        spacing, own = spacing_between(surfaces, s, radius), 0.0
-        while not flat and 2.0 * e * longest > spacing and top + 2 < DEEPEST:
-            before = _section_at(surfaces, i, c - 2.0 * e if inward <= 0.0 else c, single)
-            after = _section_at(surfaces, i, c + 2.0 * e if inward >= 0.0 else c, single)
-            _, sag = _walk_across(
-                surfaces, at, s, i, c, mix, radius, before, after, 2.0 * e * longest, limit, 0.0, pending, count
-            )
-            share = _share_of_parts(surfaces, sag)
-            if share == 0.0:
+        itself = _section_at(surfaces, i, c, single)
+        mix, radius = itself
+        spacing, own, divides = spacing_between(surfaces, s, radius), 0.0, not flat
+        while True:  # look along the rod, and list where there is nothing more to divide
+            looks = divides and 2.0 * e * longest > spacing and top + 2 < DEEPEST
+            before, after, way = itself, itself, 0.0
+            if looks:
+                before = _section_at(surfaces, i, c - 2.0 * e if inward <= 0.0 else c, single)
+                after = _section_at(surfaces, i, c + 2.0 * e if inward >= 0.0 else c, single)
+                way = 2.0 * e * longest
+            elif not _can_meet(surfaces, s, i, c):
                 break
+            first, listed = count, 0.0 if looks else own + left
+            count, sag = _walk_across(
+                surfaces, at, s, i, c, mix, radius, before, after, way, limit, listed, pending, count
+            )
+            if not looks:
+                if not is_part and first < count <= surfaces.near_weight.shape[0]:
+                    share = (0.25 if mix[5] > 0.0 else 1.0) * listed
+                    ends = min(surfaces.near_weight[first], surfaces.near_weight[count - 1])
+                    surfaces.whole[s, surfaces.near_node[first]] = ends == share
+                break
+            share = _share_of_parts(surfaces, sag)
+            divides = share > 0.0
+            if not divides:
+                continue
             own += (1.0 - share) * left
             left *= share / 3.0
             for side in range(-1, 2, 2):
@@ -286,15 +298,6 @@ def _list_stretch(surfaces, at, s, i, single, middle, inward, weight, flat, limi
                     pending[top, 2], pending[top, 3] = 0.0, left if inward == 0.0 else 2.0 * left
                     top += 1
             e, is_part = e / 3.0, True
-        if _can_meet(surfaces, s, i, c):
-            itself, first = (mix, radius), count
-            count, _ = _walk_across(
-                surfaces, at, s, i, c, mix, radius, itself, itself, 0.0, limit, own + left, pending, count
-            )
-            if not is_part and first < count <= surfaces.near_weight.shape[0]:
-                share = (0.25 if mix[5] > 0.0 else 1.0) * (own + left)
-                ends = min(surfaces.near_weight[first], surfaces.near_weight[count - 1])
-                surfaces.whole[s, surfaces.near_node[first]] = ends == share
     return count
 
 
@@ -327,21 +330,22 @@ def _walk_across(surfaces, at, s, i, part, mix, radius, before, after, way, limi
     sag : float
         The largest along the rod [m].
     """
-    largest, v, carried, border = 0.0, -1.0, 0.0, mix[5]
-    if border == 0.0:
-        return _at_place(surfaces, at, s, i, part, mix, radius, before, after, way, limit, 0.0, weight, count)
+    largest, border = 0.0, mix[5]
+    v, carried = (-1.0, 0.0) if border > 0.0 else (0.0, 1.0)
     c = rod_point(surfaces, at, i, (mix[0], mix[1], mix[2], mix[3], mix[4], 0.0))
     e = rod_point(surfaces, at, i, mix)
     h0, h1, h2 = e[0] - c[0], e[1] - c[1], e[2] - c[2]
     half, spacing = math.sqrt(h0 * h0 + h1 * h1 + h2 * h2), spacing_between(surfaces, s, radius)
     gap, n0, n1, n2, _, _, _ = gap_normal(surfaces, at, radius, s, c[0] - h0, c[1] - h1, c[2] - h2)
     slope = n0 * h0 + n1 * h1 + n2 * h2
-    for side in range(2):
-        first = DEEPEST
+    for half_width in range(0 if border > 0.0 else 2, 3):  # from border to middle, to the other border, and that itself
+        first, end, own = DEEPEST, 1.0 * half_width, 0.5
+        if half_width == 2:
+            end, own = v, 0.0
         end_gap, n0, n1, n2, _, _, _ = gap_normal(
-            surfaces, at, radius, s, c[0] + side * h0, c[1] + side * h1, c[2] + side * h2
+            surfaces, at, radius, s, c[0] + end * h0, c[1] + end * h1, c[2] + end * h2
         )
-        pending[first, 0], pending[first, 1], pending[first, 2] = side, 0.5, 0.0
+        pending[first, 0], pending[first, 1], pending[first, 2] = end, own, 0.0
         pending[first, 3], pending[first, 4] = end_gap, n0 * h0 + n1 * h1 + n2 * h2
         top = first + 1
         while top > first:
@@ -368,8 +372,7 @@ def _walk_across(surfaces, at, s, i, part, mix, radius, before, after, way, limi
             largest = max(largest, sag)
             v, gap, slope, carried = end, pending[k, 3], pending[k, 4], 0.5 * own + more
             top -= 1
-    count, sag = _at_place(surfaces, at, s, i, part, mix, radius, before, after, way, limit, v, carried * weight, count)
-    return count, max(largest, sag)
+    return count, largest
 
 
 @kernel

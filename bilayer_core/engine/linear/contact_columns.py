@@ -32,7 +32,7 @@ from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 
 MOST_SWEEPS = 4
-"""In which columns are chosen."""
+"""In which columns are chosen; after as many as there are contacts, and one more, nothing changes."""
 MOST_OF_SIDE = 15
 """Unknowns that move a side: of four nodes and three edges."""
 
@@ -76,7 +76,7 @@ def _list_contacts(columns, rails, rate, strands, simplified, contacts):
             _subtract(matrix, tangential, n1 * u2 - n2 * u1, n2 * u0 - n0 * u2, n0 * u1 - n1 * u0)
             if simplified > 1:
                 _subtract(matrix, tangential, u0, u1, u2)
-        for side in range(2):
+        for side in range(contacts.node.shape[1]):
             if rails.exists:
                 _list_rails(columns, rails, rate, strands, contacts, c, e, side)
             else:
@@ -239,7 +239,7 @@ def _add_own_sides(columns, band):
     """
     half, entries = columns.unknown.shape[1] // 2, stack_vector(MOST_OF_SIDE)
     for c in range(columns.contacts):
-        for side in range(2):
+        for side in range(columns.node.shape[1]):
             begin = side * half
             for a in range(begin, begin + half):
                 row = columns.unknown[c, a]
@@ -289,7 +289,7 @@ def _choose_unknowns(columns):
     mark[:, :2] = -1
     mark[:, 2] = 0
     met[:] = 0
-    for sweep in range(MOST_SWEEPS):
+    for sweep in range(min(MOST_SWEEPS, columns.contacts + 1)):
         if not _choose_once(columns, sweep * columns.contacts):
             break
     chosen = 0
