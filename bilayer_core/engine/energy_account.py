@@ -171,23 +171,24 @@ def _supply_by_jumps(p, state, inputs, work):
         work.strain[i] -= work.start_strain[i]
     if p.flattening.exists:
         pull_of_rest(p, configuration_at(work.configurations[0]), stage)
-    stage.rest_edge[:], stage.rest_joint[:, 0] = 0.0, 0.0  # scratch until a stage begins
+    stage.rest_edge[:], stage.rest_joint[:] = 0.0, 0.0  # scratch until a stage begins
     for k in range(drives.driven_edge.shape[0]):
         stage.rest_edge[drives.driven_edge[k]] += drives.driven_weight[k] * work.strain[drives.driven_law[k]]
     for k in range(drives.driven_joint.shape[0]):
         j, strained = drives.driven_joint[k], work.strain[drives.driven_joint_law[k]]
-        stage.rest_joint[j, 0] += drives.driven_joint_weight[k] * strained
+        stage.rest_joint[j, drives.driven_joint_column[k]] += drives.driven_joint_weight[k] * strained
     if p.flattening.exists:
-        pull_of_change(p.flattening, stage.rest_joint)
+        pull_of_change(strands, p.flattening, stage.rest_joint)
     for k in range(drives.driven_edge.shape[0]):
         e = drives.driven_edge[k]
         force = strands.axial_stiffness[e] * stage.rest_edge[e] * strands.rest_length[e]
         work.start_force[drives.driven_law[k]] -= drives.driven_weight[k] * force
     for k in range(drives.driven_joint.shape[0]):
-        j = drives.driven_joint[k]
+        j, column = drives.driven_joint[k], drives.driven_joint_column[k]
         if p.flattening.exists:
-            work.start_force[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * p.flattening.pull[j]
-            if j >= p.flattening.first:
+            pull = p.flattening.pull[j, column]
+            work.start_force[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * pull
+            if j >= p.flattening.first or column != 0:
                 continue
         moment = strands.joint_stiffness[j, 0] * stage.rest_joint[j, 0]
         work.start_force[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * moment

@@ -38,10 +38,10 @@ def write_forces_of_laws(p, at, stage, force_out):
     if p.flattening.exists:
         pull_of_rest(p, at, stage)
     for k in range(drives.driven_joint.shape[0]):
-        j = drives.driven_joint[k]
+        j, column = drives.driven_joint[k], drives.driven_joint_column[k]
         if p.flattening.exists:
-            force_out[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * p.flattening.pull[j]
-            if j >= p.flattening.first:
+            force_out[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * p.flattening.pull[j, column]
+            if j >= p.flattening.first or column != 0:
                 continue
         a, b = strands.joint_a[j], strands.joint_b[j]
         t, u = row(at.tangent, a), row(at.tangent, b)

@@ -29,13 +29,15 @@ import math
 
 from bilayer_core.forces.bend_twist import bend_by_strains
 from bilayer_core.forces.elements import acts_viscously
+from bilayer_core.forces.flattening import strip_law
 from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.piece import Piece
 from bilayer_core.model.force_slots import slot_of
 from bilayer_core.model.records.parts import Plane
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.step import Configuration, Stage
 
-STRETCHING, BENDING, BOND = map(slot_of, ("stretching", "bending", "bond"))
+STRETCHING, BENDING, FLATTENING, BOND = map(slot_of, ("stretching", "bending", "flattening", "bond"))
 
 
 @kernel
@@ -185,31 +187,65 @@ def planar_bond(ties, bends, bonds, plane, strands, stage, at, sums, with_hessia
     return bond, bending
 
 
-@piece(float, Plane, Problem, Configuration, Stage, bool)
-def add_elasticity_in_plane(plane, p, at, stage, with_hessian):
-    """Add stretching, bending and bonds; first derivatives by edges and pairs in space, second ones by l, φ and p."""
-    strands, bonds, off_axis, sums = p.strands, p.bonds, p.off_axis, p.sums
-    gradient, frame, axes, edge_gradient = plane.polar_gradient, plane.frame, strands.axes, sums.edge
-    gradient[:] = 0.0
-    measure_in_plane(plane, strands, at)
-    viscous = acts_viscously(p)
-    if sums.selected[STRETCHING] or viscous:
-        sums.energy[STRETCHING] = planar_stretch(plane, strands, at, stage, with_hessian)
-    bends, ties, rest = sums.selected[BENDING] or viscous, bonds.exists and sums.selected[BOND], stage.neutral_joint
-    if bends and off_axis.exists:
-        bend_by_strains(off_axis, strands, at, rest)
-        rest = off_axis.rest
-    first, last = 0 if bends else strands.bend_count, strands.joint_a.shape[0] if ties else strands.bend_count
-    sums.energy[BENDING], rotation = planar_bend(first, last, rest, plane, strands, stage, at, with_hessian)
-    if bends and off_axis.exists:
-        planar_stretch_bend(off_axis, plane, strands, stage, at, with_hessian)
-    if bonds.exists:
-        translation, of_ends = planar_bond(ties, bends, bonds, plane, strands, stage, at, sums, with_hessian)
-        sums.energy[BOND] = rotation + translation
-        sums.energy[BENDING] += of_ends
-    for k in range(frame.shape[0]):  # N t + T m
-        force, moment = gradient[k, 0], gradient[k, 1]
-        gp, gq = force * frame[k, 0] + moment * frame[k, 2], force * frame[k, 1] + moment * frame[k, 3]
-        for d in range(3):
-            edge_gradient[k, d] += gp * axes[0, d] + gq * axes[1, d]
-    return math.inf
+@kernel
+def planar_flattening(flattening, plane, strands, stage, at, with_hessian):
+    """Add F of strips, whose κ is in `at` by now, and return it [J]: ∂κ/∂Δ = σ (1 + κ²/4)."""
+    gradient, hessian, cross_hessian = plane.polar_gradient, plane.polar_hessian, plane.cross_hessian
+    flattened = 0.0
+    for i in range(flattening.joint.shape[0]):
+        k = flattening.joint[i]
+        a, b, kappa = strands.joint_a[k], strands.joint_b[k], at.joint_strain[k, 0]
+        energy, force, _, tangent, _, _, _, _ = strip_law(flattening, stage.rest_joint, i, k, kappa, 0.0)
+        flattened += energy
+        turn = 1.0 + 0.25 * kappa * kappa
+        moment = force * plane.side[a] * turn
+        gradient[a, 1] -= moment
+        gradient[b, 1] += moment
+        if with_hessian:
+            second = (tangent * turn + 0.5 * force * kappa) * turn
+            hessian[a, 2] += second
+            hessian[b, 2] += second
+            cross_hessian[k, 3] -= second
+    return flattened
+
+
+def _add_elasticity(strips: bool) -> Piece:
+    """Return the piece for rods with strips among them, or without."""
+
+    def add_elasticity(plane, p, at, stage, with_hessian):
+        """Add stretching, bending and bonds; first derivatives by edges and pairs in space, second ones by l, φ, p."""
+        strands, bonds, off_axis, sums = p.strands, p.bonds, p.off_axis, p.sums
+        gradient, frame, axes, edge_gradient = plane.polar_gradient, plane.frame, strands.axes, sums.edge
+        gradient[:] = 0.0
+        measure_in_plane(plane, strands, at)
+        viscous = acts_viscously(p)
+        if sums.selected[STRETCHING] or viscous:
+            sums.energy[STRETCHING] = planar_stretch(plane, strands, at, stage, with_hessian)
+        bends, ties, rest = sums.selected[BENDING] or viscous, bonds.exists and sums.selected[BOND], stage.neutral_joint
+        if strips:
+            bends |= sums.selected[FLATTENING]
+        if bends and off_axis.exists:
+            bend_by_strains(off_axis, strands, at, rest)
+            rest = off_axis.rest
+        first, last = 0 if bends else strands.bend_count, strands.joint_a.shape[0] if ties else strands.bend_count
+        sums.energy[BENDING], rotation = planar_bend(first, last, rest, plane, strands, stage, at, with_hessian)
+        if strips and sums.selected[FLATTENING]:
+            sums.energy[FLATTENING] = planar_flattening(p.flattening, plane, strands, stage, at, with_hessian)
+        if bends and off_axis.exists:
+            planar_stretch_bend(off_axis, plane, strands, stage, at, with_hessian)
+        if bonds.exists:
+            translation, of_ends = planar_bond(ties, bends, bonds, plane, strands, stage, at, sums, with_hessian)
+            sums.energy[BOND] = rotation + translation
+            sums.energy[BENDING] += of_ends
+        for k in range(frame.shape[0]):  # N t + T m
+            force, moment = gradient[k, 0], gradient[k, 1]
+            gp, gq = force * frame[k, 0] + moment * frame[k, 2], force * frame[k, 1] + moment * frame[k, 3]
+            for d in range(3):
+                edge_gradient[k, d] += gp * axes[0, d] + gq * axes[1, d]
+        return math.inf
+
+    add_elasticity.__name__ = "add_elasticity_of_strips_in_plane" if strips else "add_elasticity_in_plane"
+    return piece(float, Plane, Problem, Configuration, Stage, bool)(add_elasticity)
+
+
+add_elasticity_in_plane, add_elasticity_of_strips_in_plane = _add_elasticity(False), _add_elasticity(True)

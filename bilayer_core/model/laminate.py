@@ -117,14 +117,25 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
     found.path_height += [path] * len(copies)
     joints = add_strands(found, scene, rod, strands, shape, elements, body_index)
     if section_of(scene, rod) == "strip":
-        own = np.sort(joints[joints >= 0])
-        ratio = scene.materials[rod.layers[0].material].poisson_ratio
-        found.add(strip_joint=own, strip_poisson=np.full(len(own), ratio))
+        _add_strip_joints(found, scene.materials[rod.layers[0].material].poisson_ratio, joints, shape)
     coupling = whole.strain_coupling()
     coupled = coupling.any(axis=-1) & (joints >= 0)
     found.add(coupled_joint=joints[coupled], strain_coupling=coupling[coupled])
     _add_eigenstrain(found, scene, rod, whole, parts, cells, strands, axis, joints)
     add_fluid(found, scene.fluid, rod, found.rods[-len(copies) :])
+
+
+def _add_strip_joints(found: Collected, poisson: float, joints: Array, shape: StrandShape) -> None:
+    """Add the joints of a strip, whose layers have one Poisson's ratio; see `forces.flattening`."""
+    there = joints >= 0
+    order = np.argsort(joints[there])
+    constants = {"curl": poisson, "skew": 0.0, "coupling": 0.0, "offset": 0.0}
+    constants |= {"plate": 1.0 / (1.0 - poisson**2), "membrane": 1.0}
+    found.add(
+        strip_joint=joints[there][order],
+        strip_start=np.broadcast_to(shape.strains()[..., 2], joints.shape)[there][order],
+        **{f"strip_{name}": np.full(len(order), value) for name, value in constants.items()},
+    )
 
 
 def _strands(

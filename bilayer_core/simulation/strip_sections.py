@@ -3,9 +3,9 @@
 Names are those of `forces.flattening`. The moment across that a section carries is −∂F/∂κ̄y, which leaves, in the mean
 over its width,
 
-    κ_y Δl = κ̄y Δl − ν (κ₁ − κ̄₁) − N Λ κ₁ φ(Λ κ₁²)
+    κ_y Δl = κ̄y Δl − a₁ (κ₁ − κ̄₁) − 2 a₃ (ψ − ψ̄) − N Λ κ₁ φ
 
-from the curvature of a free plate, where a strip is narrow, to θ²/κ₁ where it is wide. A swollen strip that is wide
+from the curvature of a free plate, where a strip is narrow, to ψ²/κ₁ where it is wide. A swollen strip that is wide
 enough has two shapes at rest, curled along or rolled up across. Where both are in one strip, it has folded: how far
 the one reaches depends on the mesh, since the law of a joint knows nothing of the joints beside it.
 """
@@ -32,11 +32,12 @@ ACROSS = 2.0
 
 
 def _natural(model: Model, state: State) -> tuple[Array, Array, Array]:
-    """Return κ̄₁, θ̄ and κ̄y Δl of strip joints, shape (n_strip_joint,)."""
-    drives, strips, rest = model.drives, model.flattening, model.drives.joint_rest[:, [0, 2]].copy()
+    """Return κ̄₁, ψ̄ and κ̄y Δl of strip joints, shape (n_strip_joint,)."""
+    drives, strips, rest = model.drives, model.flattening, model.drives.joint_rest.copy()
     strain = free_strain(state.transduction, drives.law_gain, drives.law_reference, drives.law_saturation)
-    np.add.at(rest[:, 0], drives.driven_joint, drives.driven_joint_weight * strain[drives.driven_joint_law])
-    return rest[strips.joint, 0], rest[strips.joint, 1], rest[strips.first :, 0]
+    driven = drives.driven_joint, drives.driven_joint_column
+    np.add.at(rest, driven, drives.driven_joint_weight * strain[drives.driven_joint_law])
+    return rest[strips.joint, 0], rest[strips.joint, 2], rest[strips.first :, 0]
 
 
 def curvatures(model: Model, state: State) -> tuple[Array, Array]:
@@ -52,11 +53,12 @@ def curvatures(model: Model, state: State) -> tuple[Array, Array]:
     tangent = vector / np.linalg.norm(vector, axis=1, keepdims=True)
     a, b = tangent[first], tangent[second]
     bend = np.einsum("ki,ki->k", b, state.director1[first]) - np.einsum("ki,ki->k", a, state.director1[second])
-    kappa, theta = bend / (1.0 + np.einsum("ki,ki->k", a, b)), state.twist[strips.joint]
+    kappa, psi = bend / (1.0 + np.einsum("ki,ki->k", a, b)), state.twist[strips.joint]
     along, twist, across = _natural(model, state)
-    flattened = kappa * (across + strips.poisson * (along - kappa)) - theta**2 + twist**2
-    phi = np.array([flatness(z)[0] for z in strips.scale * kappa**2])
-    curved = across - strips.poisson * (kappa - along) - flattened * strips.scale * kappa * phi
+    free = across - strips.curl * (kappa - along) - strips.skew * (psi - twist)
+    flattened, x = kappa * free - psi**2 + strips.start, strips.scale * kappa
+    phi = [flatness(strips.series, i, strips.offset[i], x[i])[0] for i in range(len(x))]
+    curved = free - flattened * strips.scale * x * phi
     length = model.voronoi_length[strips.joint]
     place = np.arange(len(kappa))
     nearest = np.abs(place[:, None] - place[inside]).argmin(axis=1) if inside.any() else place
@@ -109,7 +111,7 @@ def shapes(model: Model, state: State) -> dict[str, str]:
         return found
     along, across = (np.abs(part) for part in curvatures(model, state))
     natural, strips = np.abs(_natural(model, state)[2]), model.flattening
-    ratio = np.sqrt(strips.scale / (3.0 * (1.0 - strips.poisson**2))) * natural  # w²κ̄y/H
+    ratio = strips.scale / np.sqrt(3.0 * (1.0 - strips.curl**2)) * natural  # w²κ̄y/H
     for strand in model.strands:
         own = _joints_of(model, strand)
         if not len(own) or not natural[own].any():
@@ -118,7 +120,7 @@ def shapes(model: Model, state: State) -> dict[str, str]:
         worst = own[ratio[own].argmax()]
         if rolled.all():
             found[strand.rod] = "rolled across"
-        elif rolled.any() and folds(float(ratio[worst]), float(strips.poisson[worst])):
+        elif rolled.any() and folds(float(ratio[worst]), float(strips.curl[worst])):
             found[strand.rod] = "folded"
         else:
             found[strand.rod] = "curled along"
