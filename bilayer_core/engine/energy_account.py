@@ -239,7 +239,8 @@ def close_step_account(p, state, work, h, beyond, end):
     if account[OPEN] == 0.0:
         open_account(p, state, work.stage, end)
         return NONE
-    write_forces_of_laws(p, end, work.stage, work.end_force)
+    if beyond:  # otherwise `add_powers` has left those of the last stage, which ends there
+        write_forces_of_laws(p, end, work.stage, work.end_force)
     grows, unsure = done.jumped, 0.0
     by_powers, power = done.supplied, account[POWER_SUPPLIED]
     for i in range(work.start_strain.shape[0]):
