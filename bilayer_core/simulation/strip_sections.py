@@ -29,6 +29,9 @@ DISTURBANCE = 1e-3
 are rolled up across, may be unstable against twist alone, and nothing else leads away from them."""
 ACROSS = 2.0
 """Curvature across over that along from which a section counts as rolled up across."""
+JUMP = 0.5
+"""Step of the curvature from a joint to the next, over the natural curvature and twist, from which on a strip that
+fibres twist has folded: one of its two shapes at rest is on either side."""
 
 
 def _natural(model: Model, state: State) -> tuple[Array, Array, Array]:
@@ -105,15 +108,24 @@ def disturb(model: Model, state: State) -> None:
 
 
 def shapes(model: Model, state: State) -> dict[str, str]:
-    """Return the shape of each strip that curls across: `curled along`, `rolled across` or `folded`."""
+    """Return the shape of each strip that curls across: `curled along`, `rolled across` or `folded`; of one that fibres
+    twist, which may have any shape between these, only that it is folded.
+    """
     found: dict[str, str] = {}
     if not model.flattening.exists:
         return found
-    along, across = (np.abs(part) for part in curvatures(model, state))
-    natural, strips = np.abs(_natural(model, state)[2]), model.flattening
+    bend, across = curvatures(model, state)
+    along, across = np.abs(bend), np.abs(across)
+    strips, (free, twist, natural) = model.flattening, _natural(model, state)
+    natural, twisted = np.abs(natural), twist**2 != strips.start
+    size = np.hypot(free, twist) / model.voronoi_length[strips.joint]
     ratio = strips.scale / np.sqrt(3.0 * (1.0 - strips.curl**2)) * natural  # w²κ̄y/H
     for strand in model.strands:
         own = _joints_of(model, strand)
+        if len(own) and twisted[own].any():
+            if (np.abs(np.diff(bend[own])) > JUMP * size[own[1:]]).any():
+                found[strand.rod] = "folded"
+            continue
         if not len(own) or not natural[own].any():
             continue
         rolled = across[own] > ACROSS * along[own]
@@ -132,6 +144,6 @@ def folded(model: Model, state: State) -> Iterator[str]:
     for name, shape in shapes(model, state).items():
         if shape == "folded":
             yield (
-                f"rods.{name} has folded: a part of it curls along and a part rolls up across, and where depends on "
-                "the mesh; a slower stimulus, or a strip that is less wide, does not fold"
+                f"rods.{name} has folded: its parts are in two shapes of rest, and where these meet depends on the "
+                "mesh; a slower stimulus, or a strip that is less wide, does not fold"
             )
