@@ -18,16 +18,23 @@ from bilayer_core.engine.linear.widths import SETS
 from bilayer_core.engine.observables import observe
 from bilayer_core.engine.step import treat_state, write_rest_strains
 from bilayer_core.forces.added_mass import fluid_momentum
+from bilayer_core.forces.bend_twist import add_bending, add_bending_of_strips
 from bilayer_core.forces.contact_on_bodies import add_contact_to_bodies
-from bilayer_core.forces.flattening import add_flattening, add_flattening_in_plane
 from bilayer_core.forces.force_register import TERMS
-from bilayer_core.forces.planar import add_elasticity_in_plane
+from bilayer_core.forces.planar import add_elasticity_in_plane, add_elasticity_of_strips_in_plane
 from bilayer_core.forces.rod_contact import bound_between_rods, find_rod_contacts
 from bilayer_core.kinematics.marker_lines import place_arrows, place_bars
 from bilayer_core.kinematics.node_frames import frames_at_nodes
 from bilayer_core.model.model import Model
 
-PLANAR = assemble_in_plane, add_elasticity_in_plane, add_flattening_in_plane, gradient_in_plane, step_in_plane
+PLANAR = assemble_in_plane, gradient_in_plane, step_in_plane
+ELASTICITY = {
+    (False, False): add_bending,
+    (False, True): add_bending_of_strips,
+    (True, False): add_elasticity_in_plane,
+    (True, True): add_elasticity_of_strips_in_plane,
+}
+"""By whether a model is planar, and whether it has strips."""
 FOR_FRAMES = frozenset(of.name for of in (observe, frames_at_nodes, place_bars, place_arrows))
 """Names of the pieces that write what a node publishes and a log holds."""
 
@@ -50,7 +57,8 @@ def needed_pieces(model: Model) -> frozenset[str]:
         () if model.joins.exists else (move_joins_to_border,),
         () if model.light.exists else (begin_light, end_light),
         () if model.fluid.exists else (fluid_momentum,),
-        (add_flattening,) if model.plane.exists else PLANAR,
+        () if model.plane.exists else PLANAR,
+        [of for of_kind, of in ELASTICITY.items() if of_kind != (model.plane.exists, model.flattening.exists)],
     )
     left_out = {of.name for pieces in unused for of in pieces}
     waiting = [integrate, treat_state, write_rest_strains]

@@ -69,7 +69,7 @@ def _grow(drives, law_strain, rest_edge_out, rest_joint_out):
     copy(drives.joint_rest, rest_joint_out)
     for k in range(drives.driven_joint.shape[0]):
         bent = drives.driven_joint_weight[k] * law_strain[drives.driven_joint_law[k]]
-        rest_joint_out[drives.driven_joint[k], 0] += bent
+        rest_joint_out[drives.driven_joint[k], drives.driven_joint_column[k]] += bent
 
 
 @kernel

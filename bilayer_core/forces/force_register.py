@@ -13,18 +13,17 @@ import numpy as np
 
 from bilayer_core.errors import ForceError
 from bilayer_core.forces.added_mass import add_added_mass, update_fluid
-from bilayer_core.forces.bend_twist import add_bending
+from bilayer_core.forces.bend_twist import add_bending, add_bending_of_strips
 from bilayer_core.forces.body_drag import add_body_drag, body_flow_of
 from bilayer_core.forces.bond import add_bonds
 from bilayer_core.forces.drag import add_drag, update_directions_of_drag
 from bilayer_core.forces.elements import start_elements
-from bilayer_core.forces.flattening import add_flattening, add_flattening_in_plane
 from bilayer_core.forces.gyroscopic import add_gyroscopic_force, spinning_of, update_gyroscopic_force
 from bilayer_core.forces.inertia import add_inertial_forces
 from bilayer_core.forces.joints import add_joints, joints_of
 from bilayer_core.forces.loads import add_moments, add_point_forces, start_dead_loads, update_followers, update_moments
 from bilayer_core.forces.mechanisms import REMEMBERED, add_mechanisms, end_mechanisms, memory_at
-from bilayer_core.forces.planar import add_elasticity_in_plane
+from bilayer_core.forces.planar import add_elasticity_in_plane, add_elasticity_of_strips_in_plane
 from bilayer_core.forces.raised import add_raised_masses
 from bilayer_core.forces.restitution import add_restitution, end_restitution, start_restitution, with_memory
 from bilayer_core.forces.rod_contact import (
@@ -91,13 +90,22 @@ class Term:
         return self.update_lagged is None and self.settle is None
 
 
+def _unless_strips(model: Model, record: Record) -> Record:
+    """Return a record, absent if rods are strips: then another piece computes the term, with flattening."""
+    return type(record).absent() if model.flattening.exists else record
+
+
 TERMS: tuple[Term, ...] = (
     Term(("stretching",), lambda model, of: of["space"], add_stretching),
-    Term(("bending", "twisting"), lambda model, of: of["space"], add_bending),
+    Term(("bending", "twisting"), lambda model, of: _unless_strips(model, of["space"]), add_bending),
+    Term(("flattening",), lambda model, of: of["space"], add_bending_of_strips),
     Term(("bond",), lambda model, of: of["space"], add_bonds),
-    Term(("stretching", "bending", "bond"), lambda model, of: of["plane"], add_elasticity_in_plane),
-    Term(("flattening",), lambda model, of: of["space"], add_flattening),
-    Term(("flattening",), lambda model, of: of["plane"], add_flattening_in_plane),
+    Term(
+        ("stretching", "bending", "bond"),
+        lambda model, of: _unless_strips(model, of["plane"]),
+        add_elasticity_in_plane,
+    ),
+    Term(("flattening",), lambda model, of: of["plane"], add_elasticity_of_strips_in_plane),
     Term(("joints",), lambda model, of: joints_of(model), add_joints),
     Term(
         ("joints", "joint friction"),

@@ -19,6 +19,7 @@ from bilayer_core.model.lit_elements import build_light
 from bilayer_core.model.model import Model, PlacedBodies
 from bilayer_core.model.planarity import require_plane
 from bilayer_core.model.plane import Plane as ScenePlane
+from bilayer_core.model.plate_strip import flattening_series
 from bilayer_core.model.point_loads import add_point_masses, build_loads, edges_of_loads
 from bilayer_core.model.raised_edges import build_raised
 from bilayer_core.model.records.parts import (
@@ -168,15 +169,17 @@ def _drives(found: Collected) -> Drives:
     numbers = np.array([own[2:] for own in found.laws], dtype=float).reshape(-1, 3).T.copy()
     rest, strips = _of_joints(found, "joint_rest", width=3), found.column("strip_joint", np.int64)
     curled = len(rest) + np.searchsorted(strips, found.column("curled_joint", np.int64))
+    driven, twisted = (found.column(f"{name}_joint", np.int64) for name in ("driven", "twisted"))
     return Drives(
         rest_strain=found.column("rest_strain"),
         joint_rest=np.concatenate([rest, np.zeros((len(strips), 3))]),
         driven_edge=found.column("driven_edge", np.int64),
         driven_law=found.column("driven_law", np.int64),
         driven_weight=found.column("driven_weight"),
-        driven_joint=np.concatenate([found.column("driven_joint", np.int64), curled]),
-        driven_joint_law=_both(found, "driven_joint_law", "curled_law", np.int64),
-        driven_joint_weight=_both(found, "driven_joint_weight", "curled_weight"),
+        driven_joint=np.concatenate([driven, curled, twisted]),
+        driven_joint_column=np.repeat([0, 0, 2], [len(driven), len(curled), len(twisted)]),
+        driven_joint_law=_of_driven(found, "law", np.int64),
+        driven_joint_weight=_of_driven(found, "weight"),
         field_channel=np.array([channel for channel, *_ in found.fields], dtype=np.int64),
         field_first=first.astype(np.int64),
         field_slowest=first[:-1] + np.array([of.max(axis=1).argmax() for of in lags], dtype=np.int64),
@@ -189,26 +192,34 @@ def _drives(found: Collected) -> Drives:
     )
 
 
-def _both(found: Collected, first: str, second: str, dtype: type = float) -> np.ndarray:
-    return np.concatenate([found.column(name, dtype) for name in (first, second)])
+def _of_driven(found: Collected, name: str, dtype: type = float) -> np.ndarray:
+    """Return a column of κ̄₁, of κ̄y Δl and of ψ̄ that follow laws."""
+    return np.concatenate([found.column(f"{of}_{name}", dtype) for of in ("driven_joint", "curled", "twisted")])
 
 
 def _flattening(found: Collected, rods: Strands) -> Flattening:
     """Return the joints of strips, in order; a clamp edge is as wide and stiff as the edge that it holds."""
-    joint, poisson, count = found.column("strip_joint", np.int64), found.column("strip_poisson"), len(rods.joint_a)
+    joint = found.column("strip_joint", np.int64)
     if not len(joint):
         return Flattening.absent()
     edges = np.stack([rods.joint_a, rods.joint_b], axis=1)[joint]
     edges = np.where(edges < rods.edge_count, edges, edges[:, ::-1])
-    width, axial = 2.0 * rods.half_width[edges].mean(axis=1), rods.axial_stiffness[edges].mean(axis=1)
-    stiffness = 0.25 * width**4 * axial / found.column("voronoi_length")[joint] ** 3
+    width, length = 2.0 * rods.half_width[edges].mean(axis=1), found.column("voronoi_length")[joint]
+    bending, offset = rods.joint_stiffness[joint, 0], found.column("strip_offset")
+    membrane = found.column("strip_membrane") * rods.axial_stiffness[edges].mean(axis=1)
+    row = np.ones(len(rods.joint_a) + len(joint), dtype=bool)
+    row[np.setdiff1d(np.arange(len(rods.joint_a)), joint)] = False
     return Flattening.zeros(
         UNALLOCATED,
-        first=count,
+        first=len(rods.joint_a),
         joint=joint,
-        poisson=poisson,
-        stiffness=stiffness,
-        scale=stiffness * (1.0 - poisson**2) / rods.joint_stiffness[joint, 0],
+        row=row,
+        stiffness=0.25 * (1.0 - offset**2) * width**4 * membrane / length**3,
+        scale=0.5 * width**2 * np.sqrt(membrane / (found.column("strip_plate") * bending * length**3)),
+        coupling=found.column("strip_coupling") * bending,
+        start=found.column("strip_start") ** 2,
+        series=flattening_series(offset),
+        **{name: found.column(f"strip_{name}") for name in ("curl", "skew", "offset")},
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from bilayer_core.model.plate_section import free_strain
 from bilayer_core.model.section import outline
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.diffusion_modes import strain_at
@@ -63,12 +64,11 @@ class EdgeFigures:
             self._shear_moduli[index] = self._moduli[index] / (2.0 * (1.0 + material.poisson_ratio))
             of_copies = dict.fromkeys(tuple(variant.layers[index].eigenstrain) for variant in rod.variants)
             ranges = np.array([_eigenstrain_range(scene, rod, layer, laws) for laws in of_copies])
-            if layer.swelling != "along":
-                self.eigenstrain_across[index] = ranges[:, 0].max(axis=0)
-            if layer.swelling == "across":
-                continue
-            self.eigenstrain[index] = ranges[:, 0].max(axis=0)
-            self.eigenstrain_range[:, index] = ranges[:, 1].min(axis=0), ranges[:, 2].max(axis=0)
+            along, across, _ = free_strain(layer)
+            self.eigenstrain_across[index] = abs(across) * ranges[:, 0].max(axis=0)
+            self.eigenstrain[index] = abs(along) * ranges[:, 0].max(axis=0)
+            ends = along * np.stack([ranges[:, 1].min(axis=0), ranges[:, 2].max(axis=0)])
+            self.eigenstrain_range[:, index] = np.sort(ends, axis=0)
         self.thickness = self._layers.sum(axis=0)
         ratios = np.array([scene.materials[layer.material].poisson_ratio for layer in rod.layers])
         self.poisson_ratio = float(ratios @ self._layers.sum(axis=1) / self._layers.sum())

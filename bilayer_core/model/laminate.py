@@ -12,7 +12,6 @@ from bilayer_core.model.findings import Figure
 from bilayer_core.model.immersed import add_fluid
 from bilayer_core.model.laminate_section import (
     Cells,
-    LayerCells,
     WholeSection,
     cells_of,
     driven_cells,
@@ -20,6 +19,7 @@ from bilayer_core.model.laminate_section import (
     side,
 )
 from bilayer_core.model.lit_elements import add_lit_elements, is_light
+from bilayer_core.model.plate_section import PlateSection
 from bilayer_core.model.section import Section, outline, sections
 from bilayer_core.model.strand_arrays import StrandArrays
 from bilayer_core.model.strands import (
@@ -33,7 +33,7 @@ from bilayer_core.model.strands import (
     strand_shape,
     with_copies,
 )
-from bilayer_core.model.strip_choice import section_of
+from bilayer_core.model.strip_choice import plate_of, section_of
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.diffusion_modes import Response, responses
 from bilayer_core.scene.pattern import stacked
@@ -87,9 +87,11 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
         layer_cells(scene, rod, slot, axis, shape, layer.length / shape.lengths, cells)
         for slot, layer in enumerate(layers)
     ]
-    whole = WholeSection(scene, rod, parts, cells, shape)
+    plate = plate_of(scene, rod)
+    whole = WholeSection(scene, rod, parts, cells, shape, plate)
     low, high = _faces(rod, axis)
-    strands = _strands(found, copies, axis, shape, (low, high))
+    strip = section_of(scene, rod) == "strip"
+    strands = _strands(found, copies, axis, shape, (low, high), strip)
     mass, centre = sum(layer.mass for layer in layers), _mass_centre(rod, layers, axis)
     elements = StrandElements(
         edge_mass=mass,
@@ -116,19 +118,42 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
     found.rods += [[(0, int(nodes[-1]), strand.first_node, strand.first_edge)] for strand in strands]
     found.path_height += [path] * len(copies)
     joints = add_strands(found, scene, rod, strands, shape, elements, body_index)
-    if section_of(scene, rod) == "strip":
-        own = np.sort(joints[joints >= 0])
-        ratio = scene.materials[rod.layers[0].material].poisson_ratio
-        found.add(strip_joint=own, strip_poisson=np.full(len(own), ratio))
+    if strip:
+        _add_strip_joints(found, scene.materials[rod.layers[0].material].poisson_ratio, plate, joints, shape)
     coupling = whole.strain_coupling()
     coupled = coupling.any(axis=-1) & (joints >= 0)
     found.add(coupled_joint=joints[coupled], strain_coupling=coupling[coupled])
-    _add_eigenstrain(found, scene, rod, whole, parts, cells, strands, axis, joints)
+    _add_eigenstrain(found, scene, rod, whole, cells, strands, axis, joints)
     add_fluid(found, scene.fluid, rod, found.rods[-len(copies) :])
 
 
+def _add_strip_joints(
+    found: Collected, poisson: float, plate: PlateSection | None, joints: Array, shape: StrandShape
+) -> None:
+    """Add the joints of a strip, those of a plate or of layers with one Poisson's ratio; see `forces.flattening`."""
+    there = joints >= 0
+    order = np.argsort(joints[there])
+
+    def of_joints(values: Array) -> Array:
+        return np.broadcast_to(values, joints.shape)[there][order]
+
+    constants = {"curl": poisson, "plate": 1.0 / (1.0 - poisson**2), "membrane": 1.0, "offset": 0.0}
+    turned = {"skew": 0.0, "coupling": 0.0}  # of the opposite sign in a mirror image
+    if plate is not None:
+        (along, both, _), (curl, skew) = plate.narrow, plate.across
+        constants |= {"curl": curl, "plate": plate.plate / along, "offset": plate.offset}
+        turned = {"skew": 2.0 * skew, "coupling": both / along}
+    handedness = np.reshape(shape.handedness, (-1, 1))
+    found.add(
+        strip_joint=of_joints(joints),
+        strip_start=of_joints(shape.strains()[..., 2]),
+        **{f"strip_{name}": of_joints(np.array(value)) for name, value in constants.items()},
+        **{f"strip_{name}": of_joints(value * handedness) for name, value in turned.items()},
+    )
+
+
 def _strands(
-    found: Collected, copies: list[RodCopy], axis: float, shape: StrandShape, faces: tuple[Array, Array]
+    found: Collected, copies: list[RodCopy], axis: float, shape: StrandShape, faces: tuple[Array, Array], strip: bool
 ) -> list[StrandArrays]:
     """Return the strand of each copy; `faces` are heights of the two faces over the curve [m]."""
     rod, (low, high) = copies[0].rod, faces
@@ -154,6 +179,7 @@ def _strands(
                 curvature=curvature,
                 closed=shape.closed,
                 round=rod.radius is not None,
+                strip=strip,
                 layers=drawn,
             )
         )
@@ -165,6 +191,9 @@ def _placed(scene: SceneConfig, rod: Rod) -> list[_Placed]:
 
 
 def _axis_of(scene: SceneConfig, rod: Rod) -> float:
+    plate = plate_of(scene, rod)
+    if plate is not None:
+        return plate.axis
     return scene.keep("axis", (rod,), lambda: _axis(_placed(scene, rod)))
 
 
@@ -302,7 +331,6 @@ def _add_eigenstrain(
     scene: SceneConfig,
     rod: Rod,
     whole: WholeSection,
-    parts: list[LayerCells],
     cells: Cells,
     strands: list[StrandArrays],
     axis: float,
@@ -316,8 +344,8 @@ def _add_eigenstrain(
     of_edges: list[tuple[Array, ...]] = []
     of_joints: list[tuple[Array, ...]] = []
     strip = section_of(scene, rod) == "strip"
-    followed = [(layer, law, part) for layer, part in zip(rod.layers, parts, strict=True) for law in layer.eigenstrain]
-    for layer, law, part in followed:
+    followed = [(slot, layer, law) for slot, layer in enumerate(rod.layers) for law in layer.eigenstrain]
+    for slot, layer, law in followed:
         edges, covered = np.array(rod.driven_edges(layer, law)), driven_cells(rod, cells, layer, law)
         if is_light(scene, law):
             heights = np.full(rod.stations - 1, axis)
@@ -333,18 +361,19 @@ def _add_eigenstrain(
             ]
         for (mean, gradient), driven, along in groups:
             grown = along * (covered & np.isin(cells.edge, driven))
-            laws = [(mean, *whole.driven(part, grown))]
-            if gradient >= 0:
-                laws.append((gradient, *whole.driven_by_gradient(part, grown, layer.thickness)))
-            for number, weight, bend in laws:
-                weight = weight[:, driven] if layer.swelling != "across" else np.zeros_like(weight[:, driven])
+            for number, by_gradient in ((mean, False), (gradient, True)):
+                if number < 0:
+                    continue
+                weight, bend, curl, twist = whole.driven(slot, grown, by_gradient)
+                weight = weight[:, driven]
                 of_edges.append((first_edge + driven, np.full(weight.shape, number), weight))
+                for name, turn in (("curled", curl), ("twisted", twist)) if strip else ():
+                    turned = (turn != 0.0) & (joints >= 0)
+                    laws_of = np.full(turned.sum(), number)
+                    found.add(
+                        **{f"{name}_joint": joints[turned], f"{name}_law": laws_of, f"{name}_weight": turn[turned]}
+                    )
                 bent = (bend != 0.0) & (joints >= 0)
-                if strip and layer.swelling != "along":
-                    curl = np.full(bent.sum(), number)
-                    found.add(curled_joint=joints[bent], curled_law=curl, curled_weight=bend[bent])
-                if layer.swelling == "across":
-                    bent = np.zeros_like(bent)
                 copy, _ = np.nonzero(bent)
                 of_joints.append((copy, joints[bent], np.full(len(copy), number), bend[bent]))
     if not of_edges:

@@ -47,6 +47,7 @@ from typing import Any
 
 import numpy as np
 
+from bilayer_core.model.plate_section import PlateSection, free_strain
 from bilayer_core.model.section import bond, sections
 from bilayer_core.model.strands import StrandShape
 from bilayer_core.model.unknown_order import ReadOnlyArrays
@@ -218,21 +219,33 @@ class WholeSection:
         [N m] and κ̄₁ κ̄₂ ψ̄ [rad] at all nodes, shape (n_copy, n_node, 3).
     """
 
-    def __init__(self, scene: SceneConfig, rod: Rod, layers: list[LayerCells], cells: Cells, shape: StrandShape):
+    def __init__(
+        self,
+        scene: SceneConfig,
+        rod: Rod,
+        layers: list[LayerCells],
+        cells: Cells,
+        shape: StrandShape,
+        plate: PlateSection | None,
+    ):
+        self._rod, self._layers, self._plate, self._handedness = rod, layers, plate, shape.handedness
         self._cells, self._half_length = cells, 0.5 * shape.lengths[..., None]
         stretch = sum(layer.stretch for layer in layers)
         coupling = sum(layer.stretch * layer.height for layer in layers)
         bending = sum(layer.bend + layer.stretch * layer.height**2 for layer in layers)
         coupling = np.where(np.abs(coupling) <= ON_AXIS * np.sqrt(stretch * bending), 0.0, coupling)
+        growth = (1.0, 1.0, 1.0) if plate is None else plate.growth
+        if plate is not None:  # whose curve is where it does not couple
+            stretch, coupling, bending = growth[0] * stretch, 0.0 * coupling, growth[1] * bending
         self._of_cells = stretch, coupling, bending
         self._of_halves = self._in_series(stretch, coupling, bending)
         stretch, coupling, bending = self._of_halves
         moment = self._loads(0.0 * sum(layer.bend for layer in layers), sum(layer.natural_moment for layer in layers))
-        twist = sum(layer.twist for layer in layers) + _bond_twist(scene, rod, layers, cells)
+        twist = growth[2] * (sum(layer.twist for layer in layers) + _bond_twist(scene, rod, layers, cells))
 
         self.axial_stiffness = np.mean(stretch - coupling**2 / bending, axis=-1)
         self.rest_strain = self._rest_strains(*moment) / self.axial_stiffness
-        across = sum(layer.across for layer in layers)
+        across = growth[0] * sum(layer.across for layer in layers)
         flexibility = [1.0 / bending, cells.means(1.0 / across), cells.means(1.0 / twist)]
         self.joint_stiffness = 1.0 / np.stack([self.to_nodes(part) for part in flexibility], axis=-1)
         self.joint_rest = shape.strains()
@@ -278,19 +291,30 @@ class WholeSection:
         pairs[:, 1:, 0], pairs[:, :-1, 1] = slope[..., 1], slope[..., 0]
         return pairs
 
-    def driven(self, layer: LayerCells, driven: Array) -> tuple[Array, Array]:
-        """Return what an eigenstrain of a layer gives, by parts in cells, shape (n_cell,): rest strains N*/A* of all
-        edges, shape (n_copy, n_edge), and κ̄₁ of all nodes, −Σ ℓ M/D [rad], shape (n_copy, n_node).
-        """
-        axial = driven * layer.axial * np.ones_like(layer.ratio)
-        return self._driven_by(axial, -axial * layer.height)
+    def driven(self, slot: int, driven: Array, by_gradient: bool = False) -> tuple[Array, Array, Array, Array]:
+        """Return what an eigenstrain 1 of a layer gives, by parts in cells, shape (n_cell,): rest strains N*/A* of all
+        edges, shape (n_copy, n_edge), and of all nodes κ̄₁ (−Σ ℓ M/D in a beam), κ̄y Δl and ψ̄ [rad], shape (n_copy,
+        n_node).
 
-    def driven_by_gradient(self, layer: LayerCells, driven: Array, thickness: float) -> tuple[Array, Array]:
-        """Return the same of an eigenstrain that grows by 1 through a layer of a thickness [m] and is 0 on average:
-        alone it would bend to −1/h, so M = −EI₁/h.
+        By its gradient, the eigenstrain grows by 1 through the layer and is 0 on average: alone that would bend to
+        −1/h, so M = −EI₁/h.
         """
-        moment = -driven * layer.ratio * layer.bend / thickness
-        return self._driven_by(0.0 * moment, moment)
+        layer = self._layers[slot]
+        if self._plate is not None:
+            driven, natural = driven * layer.ratio, self._plate.natural(slot, by_gradient)
+            stretch, _, bending = self._of_cells
+            strain, bend = self._driven_by(driven * stretch * natural.strain, driven * bending * natural.along)
+            length = self.to_nodes(self._cells.means(driven))
+            twist = np.reshape(self._handedness, (-1, 1)) * length * natural.twist
+            return strain, bend, length * natural.across, twist
+        if by_gradient:
+            moment = -driven * layer.ratio * layer.bend / self._rod.layers[slot].thickness
+            strain, bend = self._driven_by(0.0 * moment, moment)
+        else:
+            axial = driven * layer.axial * np.ones_like(layer.ratio)
+            strain, bend = self._driven_by(axial, -axial * layer.height)
+        along, across, _ = free_strain(self._rod.layers[slot])
+        return along * strain, along * bend, across * bend, 0.0 * bend
 
     def _driven_by(self, force: Array, moment: Array) -> tuple[Array, Array]:
         """Return rest strains of edges and κ̄₁ of nodes from what layers would bear in cells at rest [N, N m]."""

@@ -35,6 +35,8 @@ CURVATURES = np.linspace(0.01, 1.6, 1600)
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 SECTIONS = 32
 """Golden sections, which leave 1e-7 of κ̄."""
+TERMS = 12
+"""Of the series of φ, by powers of x²: exact to rounding up to |x| = 32."""
 
 
 def _factor(ratio: Array, poisson: float) -> Array:
@@ -94,3 +96,25 @@ def folds(ratio: float, poisson: float) -> bool:
     """Return whether a swollen strip, held straighter than it rests, has a negative tangent somewhere."""
     energy = swollen_energy(CURVATURES, ratio, poisson)
     return bool((np.diff(energy, 2) < 0.0).any())
+
+
+def flattening_series(offset: Array) -> Array:
+    """Return the coefficients of φ(x; β) = (N₀ + x N₁)/(D₀ + x D₁), polynomials of x²; see `forces.flattening`.
+
+    Parameters
+    ----------
+    offset : ndarray
+        β, shape (n,).
+
+    Returns
+    -------
+    ndarray
+        Of N₀, D₀, N₁ and D₁, the highest power first, shape (n, 4, TERMS).
+    """
+    power, offset = np.arange(2 * TERMS + 3), np.asarray(offset, float)[:, None]
+    up, down = (1.0 + offset) ** power, (offset - 1.0) ** power
+    factorial = np.array([float(math.factorial(2 * k + 1)) for k in power])
+    below = (up + down)[:, :-1] / factorial[:-1]
+    above = below - 2.0 * (up - down)[:, 1:] / (factorial[:-1] * (2.0 * power[1:]))
+    columns = above[:, 2::2], below[:, :-2:2], above[:, 3::2], below[:, 1:-2:2]
+    return np.stack([column[:, TERMS - 1 :: -1] for column in columns], axis=1)

@@ -10,8 +10,10 @@ import numpy as np
 
 from bilayer_core.model.edge_figures import EdgeFigures, edge_figures
 from bilayer_core.model.findings import Figure
+from bilayer_core.model.plate_section import PlateSection, is_plate, plate_section
 from bilayer_core.model.plate_strip import curved_stiffness, folds, swollen_curvature, swollen_curvature_across
 from bilayer_core.scene.config import Coupling, SceneConfig
+from bilayer_core.scene.diffusion_modes import strain_at
 from bilayer_core.scene.profile import Profile
 from bilayer_core.scene.rod import Rod
 
@@ -45,7 +47,9 @@ class Departure:
 
 
 def departure(rod: Rod, at_edges: EdgeFigures) -> Departure:
-    """Return by how much a strip with the figures of a rod differs from a beam."""
+    """Return by how much a strip with the figures of a rod differs from a beam; nothing is said of one with fibres."""
+    if any(layer.fibres for layer in rod.layers):
+        return Departure(0.0, 0.0, 0.0, 0.0)
     curvature, poisson = at_edges.curvature(), at_edges.poisson_ratio
     ratio = at_edges.width**2 * curvature / at_edges.thickness
     swells = at_edges.free_curvature() > 0.5 * curvature
@@ -64,10 +68,6 @@ def refusal(scene: SceneConfig, rod: Rod) -> str:
     """Return why a rod of the laminate cannot be a strip; empty if it can."""
     if rod.radius is not None:
         return "needs a rectangular section, and it is round"
-    ratios = sorted({scene.materials[layer.material].poisson_ratio for layer in rod.layers})
-    if len(ratios) > 1:
-        told = " and ".join(f"{ratio:g}" for ratio in ratios)
-        return f"needs layers with one poisson_ratio, has {told}: unlike ones curl across by themselves"
     if len({scene.materials[layer.material].retardation_time for layer in rod.layers}) > 1:
         return "needs layers with one retardation_time"
     for layer in rod.layers:
@@ -75,6 +75,8 @@ def refusal(scene: SceneConfig, rod: Rod) -> str:
             return f"needs layers that cover all of it, and {layer.name} has an `interval`"
         if layer.natural_twist != 0.0:
             return f"takes its twist from its path, and {layer.name} has a `natural_twist`"
+        if layer.natural_curvature is not None and is_plate(scene, rod):
+            return f"of fibres or of unlike poisson_ratio takes no `natural_curvature`, and {layer.name} has one"
         for key in ("thickness", "stiffness"):
             if isinstance(getattr(layer, key), Profile):
                 return f"needs one {key} all along it, and that of {layer.name} is a profile"
@@ -93,6 +95,11 @@ def section_of(scene: SceneConfig, rod: Rod) -> str:
         return "beam"
     found = departure(rod, edge_figures(scene, rod))
     return "strip" if max(abs(found.of_curvature), found.of_stiffness) > MOST and not refusal(scene, rod) else "beam"
+
+
+def plate_of(scene: SceneConfig, rod: Rod) -> PlateSection | None:
+    """Return the section of a rod of the laminate if it is that of a laminated plate."""
+    return plate_section(scene, rod) if is_plate(scene, rod) and section_of(scene, rod) == "strip" else None
 
 
 @lru_cache(maxsize=32)
@@ -149,6 +156,9 @@ def plate_figures(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterat
             stiffer / PLATE,
             "its section keeps its shape; that of a beam bends freely" if stiffer > PLATE and not told else "",
         )
+    plate = plate_of(scene, rod)
+    if plate is not None and any(layer.fibres for layer in rod.layers):
+        yield from _of_fibres(where, scene, rod, at_edges, plate)
     if not strip:
         return
     limit = folding_ratio(at_edges.poisson_ratio)
@@ -166,6 +176,39 @@ def plate_figures(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterat
             held / HELD,
             "a strip curls across up to its clamps",
         )
+
+
+def _of_fibres(
+    where: str, scene: SceneConfig, rod: Rod, at_edges: EdgeFigures, plate: PlateSection
+) -> Iterator[Figure]:
+    """Yield to what layers with fibres bend and twist a narrow strip, and what part of its stiffness is left out."""
+    bend = twist = 0.0
+    for slot, layer in enumerate(rod.layers):
+        natural = plate.natural(slot)
+        for law in layer.eigenstrain:
+            channel = scene.stimuli[law.stimulus]
+            strain = max(strain_at(rod, layer, law, np.array([channel.minimum, channel.maximum])), key=abs)
+            bend, twist = bend + strain * natural.along, twist + strain * natural.twist
+    held = rod.clamp_start and rod.clamp_end
+    size = bend**2 + twist**2
+    if size > 0.0:
+        ratio = float((at_edges.width**2 / at_edges.thickness).max()) * size**0.5
+        helix = f"radius {1e3 * abs(bend) / size:.3g} mm and pitch {2e3 * np.pi * abs(twist) / size:.3g} mm"
+        yield Figure(
+            where,
+            "its fibres bend and twist it, where it is narrow, to",
+            f"{bend:.3g} and {twist:.3g} 1/m at most (w²κ/H {ratio:.2g})",
+            f"a helix of {helix}",
+            0.0,
+        )
+    yield Figure(
+        where,
+        "a pull along it would twist it as well, which is left out:",
+        f"{100 * abs(plate.pulled):.2g} % of the mean of both stiffnesses",
+        f"at most {100 * PLATE:g} %, or an end that is free",
+        abs(plate.pulled) / PLATE,
+        "curvature and twist are those without a pull" if held and abs(plate.pulled) > PLATE else "",
+    )
 
 
 def _of_folds(where: str, at_edges: EdgeFigures, ratio: float, limit: float) -> Figure:

@@ -23,8 +23,10 @@ from bilayer_core.scene.pattern import Patterns, Placement, pair_at_one_place, p
 from bilayer_core.scene.point_paths import PolylinePath, SplinePath
 from bilayer_core.scene.profile import Profile, doubled, extremes, values_at, varying
 from bilayer_core.scene.units import (
+    Angle,
     Curvature,
     NonNegativeLength,
+    Number,
     PositiveLength,
     PositiveNumber,
     Twist,
@@ -45,6 +47,32 @@ Diffusions = Annotated[
         json_schema_input_type=Diffusion | list[Diffusion] | None,
     ),
 ]
+
+
+class FibreDirection(Part):
+    """A layer with fibres in one direction of its plane."""
+
+    swelling: Number = 1.0
+    """Multiple of the layer's eigenstrain."""
+    stiffness: PositiveNumber = 1.0
+    """Multiple of Young's modulus of the layer."""
+
+
+class Fibres(Part):
+    """Aligned fibres in a layer: it swells and is stiff along them as not across them."""
+
+    angle: Angle
+    """From the path to the fibres, counter-clockwise as seen from where the rod's normal points. The mirror images of a
+    pattern have the opposite one.
+    """
+    along: FibreDirection = FibreDirection()
+    """Along the fibres."""
+    across: FibreDirection = FibreDirection()
+    """Across them, in the plane of the layer."""
+    shear: PositiveNumber = 1.0
+    """Multiple of the layer's shear modulus, for shear between the two directions. The material's `poisson_ratio` is
+    that of a pull along the fibres.
+    """
 
 
 class Layer(Part):
@@ -70,6 +98,8 @@ class Layer(Part):
     """Direction in the layer's plane in which its eigenstrain acts: all, or one along or across the path, as that of
     aligned fibres. A rod with `section: strip` curls across as well.
     """
+    fibres: Fibres | None = None
+    """Fibres at an angle to the path, in a rod with `section: strip`: what swells then bends and twists it."""
     natural_twist: varying(Twist) = 0.0
     """Of the layer by itself, about the path, beside the twist of the path."""
 
@@ -425,6 +455,12 @@ def _faults_of_diffusion(rod: Rod) -> Iterator[Fault]:
 def _faults_of_section(rod: Rod) -> Iterator[Fault]:
     """Yield the faults of layers that only a strip can have."""
     for index, layer in enumerate(rod.layers):
+        if layer.fibres is not None and rod.section != "strip":
+            demand = "must be left out: a beam does not feel them; `section: strip` of the rod does"
+            yield ("layers", index, "fibres"), layer.fibres.angle, demand
+        elif layer.fibres is not None and layer.swelling != "isotropic":
+            demand = "must be left out: `fibres` say in which direction the layer swells"
+            yield ("layers", index, "swelling"), layer.swelling, demand
         if layer.swelling == "across" and rod.section != "strip":
             demand = "must be isotropic or along: a beam does not feel it; `section: strip` of the rod does"
             yield ("layers", index, "swelling"), layer.swelling, demand

@@ -284,8 +284,8 @@ class _Search:
         strips = shapes(self.stepper.model, self.state)
         for name in (name for name, shape in strips.items() if shape == "folded"):
             raise self._failure(
-                f"rods.{name} folds: a part of it curls along and a part rolls up across, and where depends on the "
-                "mesh; raise its stimulus in steps, with statics after each",
+                f"rods.{name} folds: its parts are in two shapes of rest, and where these meet depends on the mesh; "
+                "raise its stimulus in steps, with statics after each",
                 0.0,
             )
         self.stepper.restart(self.state)

@@ -1,16 +1,24 @@
 """Strips whose section bends: derivatives, the table of wide strips, and their energy account."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.evaluations import Problem, check
+from support.evaluations import Problem, at_rest, check
 from support.sample_scenes import GEL, fixed, layer, rod, scene
 
-from bilayer_core import Simulator, load_scene
+from bilayer_core import Simulator, load_scene, read_log
 from bilayer_core.errors import SceneError, SimulationError
 from bilayer_core.forces.flattening import SERIES, flatness
+from bilayer_core.jit import UNALLOCATED
+from bilayer_core.kinematics.rotation import rotation_matrix
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run.memory import MemoryRecorder
+from bilayer_core.model.build_model import build_model
+from bilayer_core.model.plate_strip import flattening_series
 from bilayer_core.simulation.strip_sections import folded
+from bilayer_core.view.colouring import choose_colouring
 
 TABLE = {
     0.3: {0.5: 0.997, 1.0: 0.989, 2.6: 0.941, 3.0: 0.927, 4.3: 0.888, 6.0: 0.863, 10.0: 0.974, 20.0: 1.141}
@@ -77,17 +85,152 @@ def test_derivatives_of_flattening_agree_with_differences(swelling, dimension):
     check(problem)
 
 
-def test_flatness_and_its_derivatives_are_smooth_where_its_series_ends():
-    for z in (1.0, SERIES, 30.0, 1e4):
-        psi = z**0.25
-        g = 2.0 * (math.cosh(psi) - math.cos(psi)) / (psi * (math.sinh(psi) + math.sin(psi)))
-        assert flatness(z)[0] == pytest.approx((1.0 - g) / z, rel=1e-12)
-        h = 1e-3 * z
-        near, low, high = (np.array(flatness(z + step)) for step in (0.0, -h, h))
-        assert near[1:] == pytest.approx((high - low)[:2] / (2.0 * h), rel=1e-5)
-    series, closed = flatness(np.nextafter(SERIES, 0.0)), flatness(SERIES)
-    assert series == pytest.approx(closed, rel=1e-10)
-    assert np.isfinite(flatness(1e30)).all()
+BUILD = "bilayer_core.simulation.simulator.build_model"
+
+
+def anisotropic(model, hand=1.0, skew=0.3, coupling=0.2, offset=-0.3):
+    """A model whose strips have a₃ and β, couple bending with twist, and are twisted by what bends them."""
+    strips, drives, rods = model.flattening, model.drives, model.rods
+    count, twists = len(strips.joint), drives.driven_joint < strips.first
+    offsets = np.full(count, offset)
+    changed = {
+        "skew": np.full(count, hand * skew),
+        "coupling": hand * coupling * rods.joint_stiffness[strips.joint, 0],
+        "offset": offsets,
+        "series": flattening_series(offsets),
+        "stiffness": strips.stiffness * (1.0 - offset**2),
+    }
+    more = {
+        "driven_joint": drives.driven_joint,
+        "driven_joint_column": np.full(len(twists), 2),
+        "driven_joint_law": drives.driven_joint_law,
+        "driven_joint_weight": 0.7 * hand * drives.driven_joint_weight,
+    }
+    more = {name: np.concatenate([getattr(drives, name), values[twists]]) for name, values in more.items()}
+    kept = {name: getattr(drives, name) for name in drives.names}
+    fixed = {name: getattr(strips, name) for name in strips.names if name not in strips.shapes}
+    flattening = type(strips).zeros(UNALLOCATED, **fixed | changed)
+    return replace(model, flattening=flattening, drives=type(drives)(**kept | more))
+
+
+@pytest.mark.parametrize("swelling", ["isotropic", "across"])
+def test_derivatives_of_anisotropic_strips_agree_with_differences(swelling):
+    problem = Problem(wide(swelling), np.random.default_rng(1), "laminate", change=anisotropic)
+    assert (problem.model.drives.driven_joint_column == 2).any() or swelling == "across"
+    check(problem, ("flattening",))
+    check(problem)
+
+
+def test_derivatives_of_strips_with_unlike_layers_in_a_plane_agree_with_differences():
+    change = dict(skew=0.0, coupling=0.0)
+    problem = Problem(
+        wide("across"), np.random.default_rng(1), "laminate", dimension=2, change=lambda m: anisotropic(m, **change)
+    )
+    check(problem, ("flattening",))
+    check(problem)
+
+
+def bent_strip(change=lambda model: model):
+    """An evaluator of a free strip, and a configuration in which it is bent and twisted at random."""
+    content = wide() | {"bodies": []}
+    content["rods"][0].pop("clamp_start")
+    evaluator, start = at_rest(change(build_model(load_scene(content), "laminate")), 1e3)
+    model, rng, shape = evaluator.model, np.random.default_rng(2), evaluator.new()
+    step = np.zeros(model.layout.size)
+    step[model.layout.node[:, None] + np.arange(3)] = 5e-5 * rng.standard_normal((model.node_count, 3))
+    step[model.layout.edge] = 0.2 * rng.standard_normal(model.rods.edge_count)
+    evaluator.move(start, step, np.zeros((0, 6)), shape)
+    return evaluator, shape
+
+
+def test_rigid_motion_leaves_the_energy_of_an_anisotropic_strip_unchanged():
+    evaluator, shape = bent_strip(anisotropic)
+    before = evaluator.evaluate(shape, ("flattening",))["flattening"]
+    turn, moved = rotation_matrix(np.array([0.4, -1.1, 2.0])), evaluator.new()
+    moved.position[:] = shape.position @ turn.T + [0.3, -0.2, 0.7]
+    for name in ("tangent", "director1", "director2"):
+        getattr(moved, name)[:] = getattr(shape, name) @ turn.T
+    moved.length[:] = shape.length
+    assert before != 0.0
+    assert evaluator.evaluate(moved, ("flattening",))["flattening"] == pytest.approx(before, rel=1e-10)
+
+
+def section_energy(x, offset, degree=30):
+    """1 − g of a section: the least energy, over all ways in which it may curve across, of the mean of p² + D* v²."""
+    places, weights = np.polynomial.legendre.leggauss(80)
+    across, plate = math.copysign(1.0, x), 4.0 / x**2  # κ and D₂₂ for Ẽ = 1 and w = 2
+    even = [np.polynomial.Polynomial.basis(n) for n in range(0, degree, 2)]
+    curved = np.stack([of(places) for of in even], axis=1)
+    strain = -across * np.stack([of.integ(2)(places) for of in even], axis=1)
+    force = np.column_stack([strain + offset * math.sqrt(plate) * curved, np.ones(len(places))])
+    stiff = plate * (1.0 - offset**2)
+    bend = math.sqrt(stiff) * np.column_stack([curved, np.zeros(len(places))])
+    root = np.sqrt(0.5 * weights)
+    matrix = np.concatenate([root[:, None] * force, root[:, None] * bend])
+    right = np.concatenate([root * 0.5 * across * places**2, 0.0 * root])
+    _, rest, _, _ = np.linalg.lstsq(matrix / np.abs(matrix).max(axis=0), right, rcond=None)
+    return float(rest[0]) / stiff
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.3, -0.3, -0.7])
+def test_flatness_is_the_least_energy_of_a_section(offset):
+    series = flattening_series([offset])
+    for x in (1.0, -1.0, 6.0, -6.0, 20.0, -20.0):
+        assert x**2 * flatness(series, 0, offset, x)[0] == pytest.approx(section_energy(x, offset), rel=1e-7), x
+
+
+def test_strips_of_like_layers_have_the_energy_of_their_closed_form():
+    evaluator, shape = bent_strip()
+    model = evaluator.model
+    strips, rods, poisson = model.flattening, model.rods, 0.4
+    found = evaluator.evaluate(shape, ("flattening",))["flattening"]
+    width, length = 2.0 * rods.half_width[0], model.voronoi_length[strips.joint]
+    stiffness = width**4 * rods.axial_stiffness[0] / (4.0 * length**3)
+    scale = stiffness * (1.0 - poisson**2) / rods.joint_stiffness[strips.joint, 0]
+    along, across = (evaluator.stage.rest_joint[rows, 0] for rows in (strips.joint, slice(strips.first, None)))
+    kappa, _, twist = shape.joint_strain[strips.joint].T
+    missing = kappa * (across + poisson * (along - kappa)) - twist**2
+    x = np.sqrt(scale) * kappa
+    energy = 0.5 * stiffness * missing**2 * (1.0 - exact_factor(x, 0.0)) / x**2
+    assert found == pytest.approx(energy.sum(), rel=1e-9) != 0.0
+
+
+def test_the_mirror_image_of_an_anisotropic_strip_twists_the_other_way(monkeypatch):
+    shapes = []
+    for hand in (1.0, -1.0):
+        monkeypatch.setattr(BUILD, lambda *model, hand=hand: anisotropic(build_model(*model), hand))
+        simulator = Simulator(load_scene(wide(stations=11)), model="laminate", dimension=3)
+        assert simulator.solve_static().stable
+        shapes.append((simulator.positions, simulator._state.twist.copy()))
+    (position, twist), (mirrored, opposite) = shapes
+    assert np.abs(twist).max() > 1e-3
+    assert opposite == pytest.approx(-twist, abs=1e-9)
+    assert mirrored * [1.0, -1.0, 1.0] == pytest.approx(position, abs=1e-10)
+
+
+def exact_factor(x, offset):
+    """g of a section, from the roots of its equation."""
+    up, down = (np.sqrt((offset + sign) * x + 0j) for sign in (1.0, -1.0))
+    return (2.0 * (np.cosh(up) - np.cosh(down)) / (x * (np.sinh(up) / up + np.sinh(down) / down))).real
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.3, -0.6])
+def test_flatness_and_its_derivatives_are_smooth_where_its_series_ends(offset):
+    series, end = flattening_series([offset]), math.sqrt(SERIES)
+
+    def found(x):
+        return np.array(flatness(series, 0, offset, x))
+
+    for x in (3.0, -3.0, 20.0, -20.0, 50.0, -50.0, 200.0):
+        assert found(x)[0] == pytest.approx((1.0 - exact_factor(x, offset)) / x**2, rel=1e-12)
+    for x in (0.0, 1.0, -2.0, 20.0, -20.0, 50.0, -50.0):
+        h = 1e-3 * max(abs(x), 1.0)
+        near, low, high = (found(x + step) for step in (0.0, -h, h))
+        assert near[1:] == pytest.approx((high - low)[:2] / (2.0 * h), rel=1e-5, abs=1e-9)
+    for sign in (1.0, -1.0):
+        assert found(sign * np.nextafter(end, 0.0)) == pytest.approx(found(sign * end), rel=1e-10)
+    assert found(0.0)[0] == pytest.approx(1.0 / 180.0, rel=1e-14)
+    assert np.isfinite(found(1e15)).all()
 
 
 @pytest.mark.parametrize("poisson", [0.3, 0.5])
@@ -165,10 +308,38 @@ def test_the_work_of_a_stimulus_on_a_strip_is_what_it_gains(swelling, dimension)
     assert abs(simulator.summary()["numerical_energy"]) < 1e-3 * simulator.summary()["largest_energy"]
 
 
-def test_two_rods_refuse_strips_and_so_do_unlike_ratios():
+def test_two_rods_refuse_strips():
     with pytest.raises(SceneError, match="no part across the width"):
         Simulator(load_scene(wide()), model="two_rod")
-    content = wide()
-    content["materials"]["base"]["poisson_ratio"] = 0.2
-    with pytest.raises(SceneError, match="one poisson_ratio, has 0.2 and 0.4"):
-        Simulator(load_scene(content), model="laminate")
+
+
+def test_the_work_of_a_stimulus_that_twists_a_strip_is_what_it_gains(monkeypatch):
+    monkeypatch.setattr(BUILD, lambda *model: anisotropic(build_model(*model)))
+    content = wide(stations=15)
+    ramp = {"type": "ramp", "start": 0.005, "end": 0.015, "from": 0.4, "to": 1.0}
+    content["stimuli"]["humidity"]["schedule"] = ramp
+    content["solver"] = {"integrator": "sdirk2", "dt": 2e-5, "newton_tolerance": 1e-10, "dimension": 3}
+    simulator = Simulator(load_scene(content), model="laminate", budget=True)
+    simulator.run(0.02)
+    simulator.set_stimulus("humidity", 0.2)  # a jump
+    simulator.run(0.01)
+    assert np.abs(simulator._state.twist).max() > 1e-3
+    assert abs(simulator.summary()["numerical_energy"]) < 1e-3 * simulator.summary()["largest_energy"]
+
+
+def test_logs_of_strips_hold_their_section_curvature_and_pictures_can_show_it(tmp_path):
+    simulator, held = Simulator(load_scene(wide()), model="laminate"), MemoryRecorder()
+    simulator.run(0.1, observers=[McapRecorder(tmp_path / "run.mcap"), held])
+    wanted = simulator.rods["rod"].section_curvature
+    logged, name = read_log(tmp_path / "run.mcap"), "rod/rod/laminate/section_curvature"
+    assert np.abs(wanted).max() > 1.0
+    for run in (logged, held.run_data()):
+        assert run.quantities[name].values[-1] == pytest.approx(wanted, rel=1e-6)
+        colours = choose_colouring(run, "section")
+        assert colours.title == "curvature across [1/m]"
+        assert colours.values(run, run.description.strands[0])[-1] == pytest.approx(wanted, rel=1e-6)
+    beam = Simulator(load_scene(wide(section="beam")), model="laminate")
+    held = MemoryRecorder()
+    beam.run(0.1, observers=[held])
+    assert name not in held.run_data().quantities
+    assert (held.run_data().section_curvature == 0.0).all()

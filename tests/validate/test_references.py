@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from oracles.plate_strip_across import Strip, isotropic, orthotropic
 from oracles.strip_elasticity import section_torsion
 from scipy.optimize import brentq
 from scipy.special import jv
 
-from bilayer_core.verification.validate import closed_forms
+from bilayer_core.verification.validate import closed_forms, strips
 from bilayer_core.verification.validate.contacts import resting_gap
 
 
@@ -85,3 +86,21 @@ def test_the_resting_gap_is_known():
 def test_sliding_along_an_axis_is_coulombs_friction():
     v = closed_forms.oblique_slide((1.5, 0.0), (0.1, 0.4), 9.81, 0.3)
     assert v == pytest.approx([0.3 * (1.5 - 0.1 * 9.81), 0.0], rel=1e-4, abs=1e-12)
+
+
+@pytest.mark.parametrize(("degrees", "stiffness", "ratio"), [(30.0, 1.0, 10), (45.0, 1.0, 100), (30.0, 8.0, 36)])
+def test_the_shapes_of_crossed_layers_are_those_of_a_plate_solved_across_its_width(degrees, stiffness, ratio):
+    width, half, curvature = 1.0, 0.5e-3, ratio * 1e-3
+    sheet, across = orthotropic(stiffness, 1.0, 0.3, 1.0 / 2.6), (0.0, curvature * 1e-3 / 1.5)
+    angle, answer = math.radians(degrees), strips.RESTS[degrees, stiffness][ratio]
+    found = Strip(width, [(half, sheet, across, angle - 0.5 * math.pi), (half, sheet, across, angle)])
+    start = curvature * (np.array(answer) + [0.05, -0.05])
+    assert found.rest(start) / curvature == pytest.approx(answer, abs=1e-5)
+
+
+@pytest.mark.parametrize("ratio", [6, 36])
+def test_the_curvature_of_unlike_ratios_is_that_of_a_plate_solved_across_its_width(ratio):
+    half, curvature = 0.5e-3, ratio * 1e-3
+    sheets, swelling = [isotropic(1.0, nu) for nu in strips.UNLIKE.values()], curvature * 1e-3 / 1.5
+    found = Strip(1.0, [(half, sheets[0], (swelling, swelling), 0.0), (half, sheets[1], (0.0, 0.0), 0.0)])
+    assert found.rest([curvature, 0.0])[0] / curvature == pytest.approx(strips.UNLIKE_RESTS[ratio], abs=1e-5)

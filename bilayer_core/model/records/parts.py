@@ -52,9 +52,10 @@ class Drives:
     driven_law: Indices  # the law that each of them follows, shape (n_driven,)
     driven_weight: Vector  # its part of the law's eigenstrain, shape (n_driven,)
     joint_rest: Matrix  # κ̄₁ κ̄₂ ψ̄ without stimuli, then κ̄y Δl of strips [rad], shape (n_joint + n_strip_joint, 3)
-    driven_joint: Indices  # joints whose κ̄₁ follows a law, once for each law, shape (n_driven_joint,)
+    driven_joint: Indices  # rows of `joint_rest` that follow a law, once for each law, shape (n_driven_joint,)
+    driven_joint_column: Indices  # which value of the row does: 0, κ̄₁ or κ̄y Δl, or of a strip 2, ψ̄, likewise
     driven_joint_law: Indices  # likewise
-    driven_joint_weight: Vector  # κ̄₁ per eigenstrain of the law [rad], likewise
+    driven_joint_weight: Vector  # that value per eigenstrain of the law [rad], likewise
     field_channel: Indices  # stimulus channel of each field: what materials reach of it, by its modes, shape (n_field,)
     field_first: Indices  # first mode of each field, last the number of all, shape (n_field + 1,)
     field_slowest: Indices  # its mode with the longest time constant, shape (n_field,)
@@ -105,11 +106,17 @@ class Flattening:
     """Joints of strips whose section bends; see `forces.flattening`."""
 
     first: int  # row of `Stage.rest_joint` with κ̄y Δl of the first of them, those of others follow
-    joint: Indices  # shape (n_strip_joint,)
-    poisson: Vector  # ν, likewise
-    stiffness: Vector  # s = w⁴ EA/(4 Δl³) [N m], likewise
-    scale: Vector  # Λ, likewise
-    pull: Vector = ("joint rest",)  # derivative of the energy by each row of `Stage.rest_joint` [N m]
+    joint: Indices  # in order, shape (n_strip_joint,)
+    row: Flags  # whether a row of `Stage.rest_joint` is of a strip, shape (n_joint + n_strip_joint,)
+    stiffness: Vector  # s [N m], likewise
+    scale: Vector  # √Λ, likewise
+    curl: Vector  # a₁, likewise
+    skew: Vector  # 2 a₃, likewise
+    coupling: Vector  # k₁₃ [N m], likewise
+    offset: Vector  # β, likewise
+    start: Vector  # θ₀² [rad²], likewise
+    series: Stack  # coefficients of φ, see `model.plate_strip.flattening_series`, shape (n_strip_joint, 4, n_term)
+    pull: Matrix = ("joint rest", 3)  # derivative of the energy by `Stage.rest_joint` [N m]
     slope: Vector = ("strip joint",)  # second derivative by κ̄y Δl [N m]
 
 

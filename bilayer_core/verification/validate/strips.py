@@ -1,9 +1,14 @@
-"""Wide strips: curvature of free ones that swell, also after they were held flat, and their stiffness in bending."""
+"""Wide strips: curvature and twist of free ones that swell, also after they were held flat, with fibres or of unlike
+Poisson's ratios, and their stiffness in bending.
+"""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from bilayer_core.kinematics.frame_strains import rest_strains
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.closed_forms import PlateStrip
@@ -20,11 +25,17 @@ BENT = (1, 5, 36)
 def _simulator(poisson: float, dimension: int, gain: float = 0.0, length: float = 0.2, **more) -> Simulator:
     law = {"stimulus": "heat", "gain": gain}
     layers = [layer("bottom", 0.5 * THICKNESS, eigenstrain=law), layer("top", 0.5 * THICKNESS)]
-    strip = rod(layers, length, 21, width=WIDTH, section="strip", clamp_start="wall", **more.pop("held", {}))
+    return _loaded(layers, {"gel": poisson}, dimension, length, **more)
+
+
+def _loaded(
+    layers: list[dict], ratios: dict[str, float], dimension: int = 3, length: float = 0.2, stations: int = 21, **more
+) -> Simulator:
+    strip = rod(layers, length, stations, width=WIDTH, section="strip", clamp_start="wall", **more.pop("held", {}))
     content = scene(
         [strip],
         bodies=[fixed(), *more.pop("bodies", [])],
-        materials={"gel": {**GEL, "poisson_ratio": poisson}},
+        materials={name: {**GEL, "poisson_ratio": poisson} for name, poisson in ratios.items()},
         stimuli={"heat": {"schedule": {"type": "hold", "value": 0}}},
         **more,
     )
@@ -57,6 +68,79 @@ def stiffness(ratio: float, poisson: float) -> tuple[float, float]:
     return moment / (bending * curvature), PlateStrip(poisson).stiffness(WIDTH**2 * curvature / THICKNESS)
 
 
+def _rest(simulator: Simulator, values: tuple[float, ...] = (1.0,)) -> tuple[float, float]:
+    """Return the curvature and twist [1/m] in the middle of a strip, at rest after each value of its stimulus."""
+    for value in values:
+        simulator.set_stimulus("heat", value)
+        simulator.solve_static()
+    strip = simulator.rods["rod"]
+    node = len(strip.nodes) // 2
+    edges, normals = np.diff(strip.positions[node - 1 : node + 2], axis=0), strip.directors[node - 1 : node + 1]
+    tangents = edges / np.linalg.norm(edges, axis=1, keepdims=True)
+    strains = rest_strains(tangents[:1], normals[:1], tangents[1:], normals[1:])[0]
+    return strip.curvature[node], strains[2] / (strip.arc_length[node + 1] - strip.arc_length[node])
+
+
+def crossed(degrees: float, ratio: float, stiffness: float = 1.0) -> tuple[float, float]:
+    """Return κ/κ₀ and τ/κ₀ of two layers with fibres at right angles, along which they do not swell, by w²κ₀/H: the
+    lower one swells at the angle to the strip. At 45° a wide one may bend either way: κ is its size, of one joint.
+    """
+    thickness = 0.1 * THICKNESS * min(1.0, 100.0 / ratio)  # so thin that its borders matter little in twist
+    curvature = ratio * thickness / WIDTH**2
+    law = {"stimulus": "heat", "gain": curvature * thickness / 1.5}
+    along = {"swelling": 0.0, "stiffness": stiffness}
+    layers = [
+        layer(name, 0.5 * thickness, eigenstrain=law, fibres={"angle": math.radians(angle), "along": along})
+        for name, angle in (("bottom", degrees - 90.0), ("top", degrees))
+    ]
+    simulator = _loaded(layers, {"gel": 0.3}, stations=3 if degrees == 45.0 else 21)
+    # in steps: a strip that is flat while it swells may go to another shape at rest
+    bend, twist = _rest(simulator, tuple(np.geomspace(min(0.1, 1.0 / ratio), 1.0, 60)))
+    return (abs(bend) if degrees == 45.0 else bend) / curvature, twist / curvature
+
+
+def of_unlike_ratios(ratio: float) -> float:
+    """Return κ/κ₀ of two layers of unlike Poisson's ratios and one modulus, the lower one of which swells."""
+    curvature = ratio * THICKNESS / WIDTH**2
+    law = {"stimulus": "heat", "gain": curvature * THICKNESS / 1.5}
+    layers = [layer("bottom", 0.5 * THICKNESS, "low", eigenstrain=law), layer("top", 0.5 * THICKNESS, "high")]
+    return _rest(_loaded(layers, UNLIKE, 2), tuple(np.geomspace(0.05, 1.0, 20)))[0] / curvature
+
+
+UNLIKE = {"low": 0.1, "high": 0.49}
+RESTS = {
+    (30.0, 1.0): {
+        1: (0.48988, 0.84841),
+        3: (0.43804, 0.75515),
+        6: (0.37095, 0.62176),
+        10: (0.32820, 0.50658),
+        36: (0.49633, 0.36258),
+        100: (0.51746, 0.33718),
+    },
+    (45.0, 1.0): {
+        1: (0.0, 0.97963),
+        3: (0.0, 0.87110),
+        6: (0.0, 0.71495),
+        10: (0.0, 0.57914),
+        36: (0.29856, 0.39896),
+        100: (0.34301, 0.38209),
+    },
+    (30.0, 8.0): {
+        1: (0.35831, 0.62061),
+        3: (0.34404, 0.59490),
+        6: (0.31581, 0.53747),
+        10: (0.28993, 0.46666),
+        36: (0.45188, 0.33335),
+        100: (0.48646, 0.31483),
+    },
+}
+"""(κ, τ)/κ₀ of crossed layers, by angle and stiffness of the fibres over that across them, and by w²κ₀/H."""
+UNLIKE_RESTS = {1: 0.96878, 3: 0.90217, 6: 0.81686, 10: 0.96393, 36: 1.17606, 100: 1.21863}
+"""κ/κ₀ of layers of the ratios `UNLIKE`. All are those of a plate strip solved across its width, by
+`tests/oracles/plate_strip_across.py`.
+"""
+
+
 PLATE = "a plate strip, solved across its width"
 CASES = [
     Case(
@@ -72,4 +156,55 @@ CASES = [
 CASES += [
     Case(f"strips/bending stiffness, ν 0.5/w²κ/H {ratio:g}", PLATE, 1e-3, lambda ratio=ratio: stiffness(ratio, 0.5))
     for ratio in BENT
+]
+
+
+def _crossed_case(degrees: float, stiffness: float, ratio: float, which: int) -> Case:
+    """Return the case of a curvature (0) or twist (1), in parts of κ₀."""
+    told = f"fibres {stiffness:g} times as stiff, " if stiffness != 1.0 else ""
+
+    def measure() -> tuple[float, float]:
+        return crossed(degrees, ratio, stiffness)[which], RESTS[degrees, stiffness][ratio][which]
+
+    name = f"strips/crossed layers, {told}cut at {degrees:g}°/w²κ₀/H {ratio:g}/{('curvature', 'twist')[which]}"
+    return Case(name, PLATE, 1e-3, measure, scale=1.0)
+
+
+def _narrow_case(degrees: float, which: int) -> Case:
+    angle = math.radians(2.0 * degrees)
+    answer = (math.cos(angle), math.sin(angle))[which]
+    return Case(
+        f"strips/crossed layers, cut at {degrees:g}°/w²κ₀/H 0.1/{('curvature', 'twist')[which]}",
+        "κ₀ cos 2θ and κ₀ sin 2θ of narrow strips",
+        1e-3,
+        lambda: (crossed(degrees, 0.1)[which], answer),
+        scale=1.0,
+    )
+
+
+CASES += [_narrow_case(degrees, which) for degrees in (30.0, 45.0, -20.0) for which in (0, 1)]
+CASES += [
+    _crossed_case(degrees, stiffness, ratio, which)
+    for (degrees, stiffness), rests in RESTS.items()
+    for ratio in rests
+    for which in (0, 1)
+]
+CASES += [
+    Case(
+        f"strips/crossed layers, cut at 30°/wide/{name}",
+        "a cylinder of radius 1/((1 − ν) κ₀) round a direction of swelling",
+        1e-2,
+        lambda which=which, answer=answer: (crossed(30.0, 3e3)[which], answer),
+        scale=1.0,
+    )
+    for which, name, answer in ((0, "curvature", 0.7 * 0.75), (1, "twist", 0.7 * math.sqrt(3.0) / 4.0))
+]
+CASES += [
+    Case(
+        f"strips/unlike ratios, ν 0.1 and 0.49/w²κ₀/H {ratio:g}",
+        PLATE,
+        1e-3,
+        lambda ratio=ratio, answer=answer: (of_unlike_ratios(ratio), answer),
+    )
+    for ratio, answer in UNLIKE_RESTS.items()
 ]
