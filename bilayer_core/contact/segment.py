@@ -138,6 +138,7 @@ def facing_contacts(rods, position, path):
             contacts.point[n], contacts.multiplicity[n], contacts.inner[n] = p, multiplicity, kind == 0
             contacts.gap[n], contacts.distance[n] = gap, gap + radii
             node[n, 0], node[n, 1] = i, j
+            contacts.edge[n, 0], contacts.edge[n, 1] = a, k
             contacts.right[n, 0] = contacts.right[n, 1] = -1
             weight[n, 0], weight[n, 1], weight[n, 2], weight[n, 3] = 1.0 - s, s, t - 1.0, -t
             for m in range(3):
@@ -244,6 +245,7 @@ def _write_contact(rods, position, n, p, k, multiplicity, inner, t, v, gap, dist
         if right < 0:
             across = 0.0
         contacts.node[n, side], contacts.right[n, side] = search.edge_node[edge], right
+        contacts.edge[n, side] = edge
         weight[n, 2 * side] = sign * (1.0 - along) * (1.0 - across)
         weight[n, 2 * side + 1] = sign * along * (1.0 - across)
         weight[n, 4 + 2 * side] = sign * (1.0 - along) * across
