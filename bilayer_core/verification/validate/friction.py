@@ -209,7 +209,11 @@ STRAIN, STRIP = 0.05, 0.1
 
 
 def stride(
-    forward: float, backward: float, stations: int, ground: dict = GROUND, dimension: int | str = "auto"
+    forward: float,
+    backward: float,
+    stations: int,
+    obstacles: tuple[dict, ...] = (GROUND,),
+    dimension: int | str = "auto",
 ) -> tuple[float, float]:
     """Return the way of the middle of a strip [mm] that extends evenly and goes back, and what it must be.
 
@@ -225,7 +229,7 @@ def stride(
         materials={"film": {"youngs_modulus": 1e9, "poisson_ratio": 0.5, "density": 1000.0}},
         gravity=[0, 0, -GRAVITY],
         stimuli={"pulse": {"schedule": {"type": "table", "times": [0, 1, 2], "values": [0, 1, 0]}}},
-        obstacles=[ground],
+        obstacles=list(obstacles),
         contact=law,
         start="settle",
         duration=2.2,
@@ -239,6 +243,16 @@ def stride(
 
 SLIDER = {"length": 0.02, "thickness": 4e-3, "coefficient": 0.5}
 """A stiff strip that slides over the ground or along a strip that is held."""
+
+
+def _box(begin: float, end: float) -> dict:
+    """Return a box between two places along x [m] whose top is that of the ground."""
+    place = [0.5 * (begin + end), 0, -0.01]
+    return {"name": "box", "type": "box", "position": place, "size": [end - begin, 0.05, 0.02]}
+
+
+ON_BOXES = {"on a box": (_box(-0.1, 0.2),), "from a box onto the ground": (_box(-0.1, 0.0237), GROUND)}
+"""Obstacles under strips that crawl, but for the ground alone; the box ends between stations, away from what rests."""
 
 
 def shift_of_pressure(under: str, width: float, dimension: int) -> tuple[float, float]:
@@ -383,6 +397,17 @@ CASES = [
         )
         for forward, backward in ((0.4, 0.5), (0.2, 0.8))
         for stations in (21, 41, 81)
+    ),
+    *(
+        Case(
+            f"friction/stride {name}/0.4 and 0.5, {stations} stations",
+            "ε L (μ₋ − μ₊)/(μ₋ + μ₊), by the place where an evenly extending strip rests",
+            0.01,
+            lambda obstacles=obstacles, stations=stations: stride(0.4, 0.5, stations, obstacles),
+            "mm",
+        )
+        for name, obstacles in ON_BOXES.items()
+        for stations in (21, 41)
     ),
     *(
         Case(
