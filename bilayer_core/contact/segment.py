@@ -26,6 +26,11 @@ in different ways:
 
 Beside a border B_facets is that of the border: the few cancel, and the many are left. Inside, the borders are farther
 away than the facet, B_facets is left of the few, and nothing of the many.
+
+So a border on a border presses with K_c/4; one on a face with K_c/8, three times that where it lies along few points
+of the face, and its gap closes farther: at a load of 0.1 K_c d̂ to 0.83 d̂ face on face, to 0.68 d̂ border on border. No
+weights make this equal: with E = ∫ b(d) dμ over a section, faces that lie on each other demand that μ is 1 in all. Each
+of the two borders could have half at most, and then the middle of a ribbon would keep nothing off.
 """
 
 from __future__ import annotations
