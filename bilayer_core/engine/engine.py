@@ -10,7 +10,7 @@ from bilayer_core.engine.actuation import Actuation
 from bilayer_core.engine.capacity import CapacityError
 from bilayer_core.engine.energy_account import open_account
 from bilayer_core.engine.error_norm import ErrorNorm
-from bilayer_core.engine.integrate import Clock, Counts, Failure, Integration, StepControl, clear, integrate
+from bilayer_core.engine.integrate import Attempt, Clock, Counts, Failure, Integration, StepControl, clear, integrate
 from bilayer_core.engine.observables import Observables, observe
 from bilayer_core.engine.potential import add_forces, expand_to_unknowns
 from bilayer_core.engine.run_extrema import count_shape
@@ -31,6 +31,8 @@ from bilayer_core.model.records.step import RunExtrema, StageInputs, StateArrays
 from bilayer_core.model.state import State
 
 Array = np.ndarray
+NO_LIMIT = 2**62
+"""Passes of Newton's method."""
 
 
 class Engine:
@@ -59,6 +61,8 @@ class Engine:
         Value of each channel at the end of the last step, shape (n_channel,).
     extrema : RunExtrema
         Of the run.
+    passes : int
+        Of Newton's method, in the last steps.
     """
 
     def __init__(
@@ -67,7 +71,7 @@ class Engine:
         self._model, self._storage, self._control = model, Storage(model), control
         sizes = self._storage.sizes
         self._newton = newton_tolerance, max_iterations
-        self._outcome, self.gap = self._storage.outcome, math.inf
+        self._outcome, self.gap, self.passes = self._storage.outcome, math.inf, 0
         methods = (method, SELF_STARTING) if method.history else (method,)
         self._methods = [used.arrays() for used in methods]
         self._configurations = [new_configuration(model, sizes) for _ in range(3)]
@@ -77,7 +81,7 @@ class Engine:
         self.stimulus = self._inputs.applied
         self.actuation: Actuation | None = None
         self._error_norm, self._counts = error_norm_of(model), Counts()
-        self._failure = Failure()
+        self._failure, self._attempt = Failure(), Attempt()
         self._state: State | None = None
         self._integration: Integration | None = None
         self._no_joints = Joints.absent()
@@ -107,13 +111,23 @@ class Engine:
         extrema.body_top[:] = -math.inf
         extrema.nodes[:], extrema.most_nodes[:], extrema.first_contact[:] = 0, 0, math.nan
 
-    def integrate(self, state: State, until: float, due: float, most: int) -> IntegrationReport:
-        """Make at most so many steps, by `integrate.integrate`. One that fails leaves `state` as it is."""
+    def integrate(
+        self, state: State, until: float, due: float, most: int, passes: int, patience: int, goes_on: bool
+    ) -> IntegrationReport:
+        """Make at most so many steps, by `integrate.integrate`. One that fails leaves `state` as it is.
+
+        After so many `passes` of Newton's method they pause before the next attempt at a step, after `patience` more
+        within one. A step that did so may go on, from the same state.
+        """
         counts, outcome = self._counts, self._outcome
+        outcome.passes, outcome.patience = passes, patience
+        if not goes_on:
+            self._attempt.rejected = 0
         self._storage.set_friction(state.friction)
         clear(counts)
         done = integrate(self._parts_for(state), until, due, most, *self._newton)
         status, pair = outcome.status, outcome.pair
+        self.passes = passes - outcome.passes
         if done > 0 or status in FAILURES:
             self._take_end()
             self._evaluated = False
@@ -128,6 +142,7 @@ class Engine:
         self._storage.set_friction(state.friction)
         while True:
             run = self._parts_for(state)
+            self._outcome.passes, self._outcome.patience = NO_LIMIT, 0
             status = treat_state(run.problem, run.state, run.work, mode, length, tolerance, self._newton[1])
             if not self.reserve(status, state):
                 break
@@ -162,6 +177,7 @@ class Engine:
                 extrema=self.extrema,
                 counts=self._counts,
                 failure=self._failure,
+                attempt=self._attempt,
             )
         return parts
 

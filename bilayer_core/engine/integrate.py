@@ -4,6 +4,9 @@ An adaptive step is made again, shorter, where its error exceeds the tolerance o
 at corners and jumps of what acts from outside, and at output times; after a jump steps begin again with the first
 step's length. A fixed step is made in as few equal parts as Newton's method needs, and in two where something jumps
 within it. All that this remembers is in the state.
+
+A step may pause, for the interpreter to ask whether to go on: before an attempt at it or, where that takes very long,
+within one, which is then made anew. What the attempts before it have shown is in `Attempt`.
 """
 
 from __future__ import annotations
@@ -35,7 +38,15 @@ from bilayer_core.jit import kernel, piece, record_at
 from bilayer_core.jit.record import CHANGES, Vector, record
 from bilayer_core.kinematics.copying import copy
 from bilayer_core.model.records.problem import Problem
-from bilayer_core.model.records.status import CONVERGED, GAINS_ENERGY, INPUTS_END, MAX_ITERATIONS, READY, TOO_INACCURATE
+from bilayer_core.model.records.status import (
+    CONVERGED,
+    GAINS_ENERGY,
+    INPUTS_END,
+    MAX_ITERATIONS,
+    PAUSED,
+    READY,
+    TOO_INACCURATE,
+)
 from bilayer_core.model.records.step import Configuration, Method, RunExtrema, StageInputs, StateArrays, Work
 
 configuration_at = record_at(Configuration)
@@ -103,6 +114,16 @@ class Failure:
 
 
 @record
+class Attempt:
+    """What a step that pauses has learned from attempts that were rejected, if any were."""
+
+    rejected: int = CHANGES
+    length: float = CHANGES  # of the next one [s]
+    shortest: float = CHANGES  # [s]
+    starts: bool = CHANGES  # whether the starter makes it
+
+
+@record
 class Integration:
     """All that steps read and write."""
 
@@ -120,6 +141,7 @@ class Integration:
     extrema: RunExtrema
     counts: Counts
     failure: Failure
+    attempt: Attempt
 
 
 def clear(counts: Counts) -> None:
@@ -220,6 +242,14 @@ def _leave(run, done, status, pair, end, gap):
     return done
 
 
+@kernel
+def _pause(run, done, status, pair, end, gap, rejected, length, shortest, starts):
+    """Note how far a step came before which something else is to be done."""
+    attempt = run.attempt
+    attempt.rejected, attempt.length, attempt.shortest, attempt.starts = rejected, length, shortest, starts
+    return _leave(run, done, status, pair, end, gap)
+
+
 @piece(int, Integration, float, float, int, float, int)
 def integrate(run, until, due, most, newton_tolerance, max_iterations):
     """Advance a state in time, by at most so many steps, as far as each succeeds, and take them into the extrema.
@@ -242,9 +272,10 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
     done : int
         Number of steps made; what they took is in `Counts`.
         In `Outcome`: why there are no more, the blocking pair of the last attempt, its configuration, and the gap.
-        `INPUTS_END`: the actuation is to be continued from the present time.
+        `INPUTS_END`: the actuation is to be continued from the present time. `PAUSED`: all `Outcome.passes` are made.
     """
     p, state, work, clock, control, counts = run.problem, run.state, run.work, run.clock, run.control, run.counts
+    attempt = run.attempt
     start_state, inputs, outcome, fixed = run.start_state, run.inputs, p.outcome, run.control.dt > 0.0
     status, pair, end, gap = READY, -1, 1, math.inf
     for k in range(most):
@@ -260,13 +291,17 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
         take_first_stimuli(run.actuation, begin, control.same, inputs)
         method = run.method
         starts = _has_to_start(run, planned)
-        if starts:
-            method = run.starter
         copy(state.values, start_state.values)
         h, time, error, shortest = planned, begin, math.inf, control.shortest
-        rejected = iterations = 0
-        residual = 0.0
+        iterations, residual, rejected = 0, 0.0, attempt.rejected
+        if rejected > 0:  # it goes on with a step that paused
+            h, shortest, starts, attempt.rejected = attempt.length, attempt.shortest, attempt.starts, 0
+        if starts:
+            method = run.starter
         while True:
+            wanted = h
+            if outcome.passes <= 0:
+                return _pause(run, k, PAUSED, -1, end, gap, rejected, wanted, shortest, starts)
             h = fit(h, goal - begin)
             time = goal if h == goal - begin else begin + h
             h = time - begin
@@ -277,7 +312,7 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
             pair, end, iterations = outcome.pair, outcome.configuration, outcome.iterations
             residual, gap = outcome.residual, outcome.gap
             if status != CONVERGED and status < MAX_ITERATIONS:
-                return _leave(run, k, status, pair, end, gap)
+                return _pause(run, k, status, pair, end, gap, rejected, wanted, shortest, starts)
             counts.iterations += iterations
             counts.factorisations += outcome.factorisations
             counts.settlings += outcome.settlings

@@ -20,7 +20,7 @@ from bilayer_core.engine.configuration import (
 )
 from bilayer_core.engine.linear.newton_matrix import factorise, solve
 from bilayer_core.engine.potential import evaluate, settle_forces, total_energy, update_lagged
-from bilayer_core.engine.request_modes import NEGATIVE, VALUE
+from bilayer_core.engine.request_modes import MINIMUM, NEGATIVE, VALUE
 from bilayer_core.forces.friction_limit import limit_by_friction
 from bilayer_core.forces.rod_contact import bound_between_rods, find_rod_contacts
 from bilayer_core.forces.surface_pairs import bound_at_surfaces
@@ -35,6 +35,7 @@ from bilayer_core.model.records.status import (
     LINE_SEARCH,
     MAX_ITERATIONS,
     NOT_FINITE,
+    PAUSED,
     READY,
     ROD_CAPACITY_EXCEEDED,
     UNSETTLED,
@@ -258,6 +259,10 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
     residual = previous = gap = math.inf
     energy = alpha = slope = noise = 0.0
     while True:
+        outcome.passes -= 1
+        if outcome.passes < -outcome.patience and wanted == MINIMUM:
+            status = PAUSED
+            break
         if task == SEARCH:
             move(p, at, alpha, stage, trial)
             if settled:

@@ -35,11 +35,16 @@ where a is left out if t is that of an end (and then g), and c if v is that of a
 
 **Friction** is lagged as in `forces.surface_friction`: s, t, n and λ = −c b′ are those at the start of the step, and
 
-    slip g = (I − n nᵀ) Σ w_m (x_m − x_m⁰),   D = μ λ h f₀(|g|/h),   force ∓ μ λ f₁ g/|g|, shared out with w_m
+    slip g = (I − n nᵀ) [Σ w_m (x_m − x_m⁰) + ω_p × A_p − ω × A],   D = μ λ h f₀(|g|/h),   force ∓ μ λ f₁ g/|g|
 
-(of a rail with its rate by nodes and edges frozen, too, so that the slip is linear in the unknowns). The two
-forces are equal and opposite. They act on the two middles, a distance D apart along n, so a couple of D times the
-friction remains: rods have no moment about their tangent from friction on their faces.
+of the two material points that are in the middle of the gap, at A_p = −(r_p + ½ d) n from the point and at A =
+(r_segment + ½ d) n from what it faces. Each turns with its edge, by ω = t × ε/l + θ t for an increment (ε, θ) of an
+edge of length l with the tangent t:
+
+    ω × A = [(t·A) ε − (A·ε) t]/l + θ t × A
+
+These rates, as those of rails, are frozen too, so that the slip is linear in the unknowns. The two forces are equal and
+opposite at one place, so that there is no couple.
 
 What is computed does not depend on the list of near pairs, which holds all contacts at any time, always in the same
 order; see `contact.rod_list`.
@@ -75,6 +80,7 @@ from bilayer_core.forces.rail_arms import (
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.called import stack_vector
 from bilayer_core.jit.record import Matrix
+from bilayer_core.kinematics.vector import cross, dot, row
 from bilayer_core.model.force_slots import slot_of
 from bilayer_core.model.records.contacts import RodContact
 from bilayer_core.model.records.problem import Problem
@@ -145,9 +151,9 @@ def start_rod_barrier(rods, p, start, stage):
 
 
 @kernel
-def _freeze(rods):
+def _freeze(rods, at):
     """Freeze the contacts found last for friction."""
-    found, sliding = rods.contacts, rods.sliding
+    found, sliding, radius = rods.contacts, rods.sliding, rods.search.edge_radius
     sliding.count[0] = found.count[0] if rods.slides else 0
     for c in range(sliding.count[0]):
         scale = 0.5 * found.multiplicity[c] * rods.stiffness * rods.point_weight[found.point[c]]
@@ -156,14 +162,30 @@ def _freeze(rods):
         sliding.right[c, 0], sliding.right[c, 1] = found.right[c, 0], found.right[c, 1]
         for m in range(3):
             sliding.normal[c, m] = found.normal[c, m]
+        for side in range(2):
+            e = found.edge[c, side]
+            sliding.edge[c, side] = e
+            _write_turn(sliding.turn, at, c, side, e, -radius[e] - 0.5 * found.gap[c], row(found.normal, c))
         for m in range(found.weight.shape[1]):
             sliding.weight[c, m] = found.weight[c, m]
 
 
 @kernel
+def _write_turn(turn_out, at, c, side, e, arm, n):
+    """Write how A = arm n of the point, or −A of what it faces, moves by the vector and turn of edge e."""
+    t, length = row(at.tangent, e), at.length[e]
+    turned, along = cross(t, n), dot(t, n)
+    for m in range(3):
+        for d in range(3):
+            turn_out[c, 3 * side + m, d] = -arm * t[m] * n[d] / length
+        turn_out[c, 3 * side + m, m] += arm * along / length
+        turn_out[c, 3 * side + m, 3] = arm * turned[m]
+
+
+@kernel
 def _freeze_at(rods, strands, at):
     """Freeze contacts, and the rates of rails, for friction."""
-    _freeze(rods)
+    _freeze(rods, at)
     if rods.rails.exists and rods.sliding.count[0] > 0:
         write_rail_rates(rods.rails, strands, at, rods.rails.slip_rate)
 
@@ -208,11 +230,13 @@ def add_rod_friction(rods, p, at, stage, with_hessian):
     if rods.sliding.count[0] > 0 and sums.selected[ROD_FRICTION]:
         rails = rods.rails
         if not rails.exists:
-            energy, lost = _add_friction(rods, stage, at.position, stage.origin_position, sums.contact_point)
+            place, origin, drag = at.position, stage.origin_position, sums.contact_point
         else:
             rails.drag[:] = 0.0
             write_rail_slips(rails, p.strands, stage, at)
-            energy, lost = _add_friction(rods, stage, rails.slip, rods.no_step, rails.drag)
+            place, origin, drag = rails.slip, rods.no_step, rails.drag
+        energy, lost = _add_friction(rods, p.strands, stage, at, place, origin, drag, sums.edge)
+        if rails.exists:
             hand_on(rails, p.strands, rails.drag, rails.slip_rate, sums.contact_point, sums.edge)
     sums.energy[ROD_FRICTION], sums.lost[ROD_FRICTION] = energy, lost
     return math.inf
@@ -360,7 +384,31 @@ def moved_between(vectors, contacts, c, m):
 
 
 @kernel
-def _add_friction(rods, stage, position, origin, gradient):
+def _add_turned(contacts, c, side, ahead, behind, ahead_before, behind_before, angle, out):
+    """Add what friction's place on a side moves by with its edge, whose ends moved from places before to others, and
+    which turned by an angle.
+    """
+    for m in range(3):
+        moved = angle * contacts.turn[c, 3 * side + m, 3]
+        for d in range(3):
+            vector = (ahead[d] - ahead_before[d]) - (behind[d] - behind_before[d])
+            moved += vector * contacts.turn[c, 3 * side + m, d]
+        out[m] += moved
+
+
+@kernel
+def _turned_since(contacts, strands, stage, at, c, out):
+    """Add what friction's places have moved by with their edges since the origin of a stage [m]."""
+    x, before = at.position, stage.origin_position
+    for side in range(2):
+        e = contacts.edge[c, side]
+        i, angle = strands.edge_node[e], at.total_angle[e] - stage.origin_angle[e]
+        ends = row(x, i + 1), row(x, i), row(before, i + 1), row(before, i)
+        _add_turned(contacts, c, side, ends[0], ends[1], ends[2], ends[3], angle, out)
+
+
+@kernel
+def _add_friction(rods, strands, stage, at, position, origin, gradient, edge_gradient):
     """Add the gradient of the dissipation potential of lagged contacts, write its second derivatives, and return it
     [J] and the power that is lost [W].
     """
@@ -372,6 +420,8 @@ def _add_friction(rods, stage, position, origin, gradient):
         along, square = 0.0, 0.0
         for m in range(3):
             slip[m] = _moved(position, origin, contacts, c, m)
+        _turned_since(contacts, strands, stage, at, c, slip)
+        for m in range(3):
             along += slip[m] * normal[c, m]
         for m in range(3):
             slip[m] -= along * normal[c, m]
@@ -391,6 +441,9 @@ def _add_friction(rods, stage, position, origin, gradient):
             gradient[j + 1, m] += weight[c, 3] * ratio * slip[m]
             if weight.shape[1] > 4:
                 _add_to_borders(contacts, c, m, ratio * slip[m], gradient)
+            for side in range(2):
+                for n in range(4):
+                    edge_gradient[contacts.edge[c, side], n] += contacts.turn[c, 3 * side + m, n] * ratio * slip[m]
             for n in range(3):
                 matrix[c, m, n] = excess * slip[m] * slip[n] - ratio * normal[c, m] * normal[c, n]
             matrix[c, m, m] += ratio
@@ -419,8 +472,8 @@ def rod_slip_along(rods, strands, stage, at, system, begin, path_out):
     end : int
         Row after the last contact.
     """
-    contacts, rails = rods.sliding, rods.rails
-    position, origin, node_step = at.position, stage.origin_position, system.node_step
+    contacts, rails, step, angle = rods.sliding, rods.rails, system.node_step, system.angle_step
+    position, origin, node_step, still = at.position, stage.origin_position, step, (0.0, 0.0, 0.0)
     if rails.exists and contacts.count[0] > 0:
         write_rail_slips(rails, strands, stage, at)
         write_rail_motions(rails, strands, rails.slip_rate, system.node_step, system.angle_step, rails.motion)
@@ -432,6 +485,12 @@ def rod_slip_along(rods, strands, stage, at, system, begin, path_out):
         for m in range(3):
             slip[m] = _moved(position, origin, contacts, c, m)
             rate[m] = moved_between(node_step, contacts, c, m)
+        _turned_since(contacts, strands, stage, at, c, slip)
+        for side in range(2):
+            e = contacts.edge[c, side]
+            i = strands.edge_node[e]
+            _add_turned(contacts, c, side, row(step, i + 1), row(step, i), still, still, angle[e], rate)
+        for m in range(3):
             of_slip += slip[m] * normal[c, m]
             of_rate += rate[m] * normal[c, m]
         square, together, total = 0.0, 0.0, 0.0

@@ -21,7 +21,8 @@ def sizes_of(model: Model) -> dict[str, int]:
     impacts, joints, pairs = len(model.impact_pairs), len(rods.joint_a), len(model.bonds.joint)
     raised, rails = len(model.raised.edge), model.rails.exists
     ribbons = rails and len(model.rails.node) > model.node_count
-    side = (4 * layout.dimension + (3 if layout.dimension == 3 else 0)) if rails else 2 * layout.dimension
+    turns = 0 if layout.dimension == 2 else 3 if rails else int("rod friction" in model.forces)
+    side = (4 if rails else 2) * layout.dimension + turns
     return {
         "node": model.node_count,
         "edge": rods.edge_count,

@@ -169,9 +169,11 @@ class RunLoop:
         counts = found.done, found.rejected, found.iterations, found.factorisations
         return StepReport(self._time, self._time - begin, *counts, found.largest_residual, found.inaccurate)
 
-    def integrate(self, most: int, until: float, due: float) -> IntegrationReport:
+    def integrate(
+        self, most: int, until: float, due: float, interrupted: Callable[[], bool] | None = None
+    ) -> IntegrationReport:
         """Advance by at most so many steps or parts of them, to `until` [s] at the latest, and by none after one that
-        has reached `due` [s].
+        has reached `due` [s], or as long as nobody has `interrupted` them.
         """
         state, before = self._state, float(self._state.step[0])
         if self._stepper.steps.adaptive:
@@ -181,7 +183,7 @@ class RunLoop:
         due = min([due, *(attached.next_due() for attached in self.attached)])
         with self.timed():
             try:
-                found = self._stepper.integrate(state, most, until, due)
+                found = self._stepper.integrate(state, most, until, due, interrupted)
             except SimulationError:
                 self.termination = Termination.FAILED.value
                 raise
@@ -265,7 +267,9 @@ class RunLoop:
             while waiting and waiting[0].time <= self._time:
                 waiting.popleft().apply(self._controls)
             until = min(end, waiting[0].time) if waiting else end
-            self.integrate(callbacks.steps_at_once, until, schedule.next_due())
+            found = self.integrate(callbacks.steps_at_once, until, schedule.next_due(), callbacks.interrupted)
+            if not found.done:
+                return Termination.INTERRUPTED
             schedule.observe_due()
             if callbacks.each_step is not None:
                 callbacks.each_step(self._time)

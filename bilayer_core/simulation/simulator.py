@@ -526,7 +526,7 @@ class Simulator:
         each_step : callable, optional
             Called with the simulated time [s] after each step, made one by one.
         interrupted : callable, optional
-            Asked every few steps; true ends the run, as ``interrupted``.
+            Asked every few steps, and within long ones; true ends the run, as ``interrupted``, at the last step made.
 
         Returns
         -------

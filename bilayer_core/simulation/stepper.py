@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import time as clock
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,7 +21,7 @@ from bilayer_core.engine.step_outcome import FAILURES, IntegrationReport
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.integrators.method import Method
 from bilayer_core.model.model import Model
-from bilayer_core.model.records.status import COLLAPSED, CROSSED, GAINS_ENERGY, INPUTS_END, TOO_INACCURATE
+from bilayer_core.model.records.status import COLLAPSED, CROSSED, GAINS_ENERGY, INPUTS_END, PAUSED, TOO_INACCURATE
 from bilayer_core.model.state import NOT_KNOWN, State
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.simulation.collapse import collapsed
@@ -33,6 +35,12 @@ from bilayer_core.simulation.surroundings import Surroundings
 
 FIXED_ROUNDING = 1e-6
 """Part of a fixed step by which two times are the same."""
+PERIOD = 0.5
+"""After which steps pause, for somebody to be asked whether they are to go on [s]."""
+FIRST_PASSES = 5
+"""Of Newton's method, before the first pause: they last 0.4 s with 1,400 stations of two layers in contact."""
+PATIENCE = 2
+"""How many times as many more end an attempt at a step, which is lost then; the next one may take twice as many."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +105,7 @@ class Stepper:
         self.engine = Engine(model, method, control, steps.newton_tolerance, max_iterations)
         self.engine.actuation = self.surroundings.actuation
         self.ledger: EnergyLedger | None = None
+        self._passes = FIRST_PASSES
 
     def _control_of(self, model: Model, steps: Steps) -> StepControl:
         """Take steps of a model, with what acts on it."""
@@ -186,7 +195,14 @@ class Stepper:
         output = round(time * rate) / rate if math.isfinite(time) else time
         return output if abs(output - time) <= TIME_ROUNDING / rate else time
 
-    def integrate(self, state: State, most: int, until: float, due: float = math.inf) -> IntegrationReport:
+    def integrate(
+        self,
+        state: State,
+        most: int,
+        until: float,
+        due: float = math.inf,
+        interrupted: Callable[[], bool] | None = None,
+    ) -> IntegrationReport:
         """Make at most so many steps, of which parts of a fixed one count, in place.
 
         Parameters
@@ -197,6 +213,8 @@ class Stepper:
             Where the last adaptive step ends [s]; a fixed one ends within half a step of it.
         due : float
             The first step that ends there or later is the last [s].
+        interrupted : callable, optional
+            Asked now and then, within long steps too; if true, steps end as `PAUSED`.
 
         Raises
         ------
@@ -210,31 +228,48 @@ class Stepper:
             raise InputError(f"until: {until} is not allowed; it must be later than the present time, {begin} s")
         if self.ledger is not None:
             self.ledger.begin_step(state, self.surroundings.load_factor(state))
-        found = self._integrate(state, until, due, 1 if self.ledger is not None else most)
-        if found.failed:
-            gap = self.engine.gap
-            self.evaluate(state)  # what the last attempt left is not what the state is
-            if not found.done:
-                raise self._failure(found, begin, state, gap)
-        if self.ledger is not None:
+        found: IntegrationReport | None = None
+        gap = math.inf
+        try:
+            found = self._integrate(state, until, due, 1 if self.ledger is not None else most, interrupted)
+        finally:
+            if found is None or found.failed or found.status == PAUSED:
+                gap = self.engine.gap
+                self.evaluate(state)  # what the last attempt left is not what the state is
+        if found.failed and not found.done:
+            raise self._failure(found, begin, state, gap)
+        if self.ledger is not None and found.done:
             self.ledger.record(state, self.surroundings.load_factor(state, found.length), found.length)
         return found
 
-    def _integrate(self, state: State, until: float, due: float, most: int) -> IntegrationReport:
+    def _integrate(
+        self, state: State, until: float, due: float, most: int, interrupted: Callable[[], bool] | None
+    ) -> IntegrationReport:
         """Make as many steps as succeed, with the capacity and the inputs that they need, and return their report."""
         found: IntegrationReport | None = None
+        passes = self._passes
+        patience = PATIENCE * passes
         while True:
             self.surroundings.cover(float(state.time[0]), state.override, state.pose_goal)
             self.engine.actuation = self.surroundings.actuation
-            more = self.engine.integrate(state, until, due, most - (found.done if found else 0))
+            begin = clock.perf_counter()
+            left = most - (found.done if found else 0)
+            more = self.engine.integrate(state, until, due, left, passes, patience, found is not None)
             found = more if found is None else found.followed_by(more)
+            if found.status == PAUSED:
+                took = clock.perf_counter() - begin
+                self._passes = passes = max(round(self.engine.passes * PERIOD / took), 1)
+                patience = max(PATIENCE * passes, 0 if more.done or more.rejected else 2 * patience)
+                if interrupted is not None and interrupted():
+                    return found
+                continue
             try:
                 if found.status != INPUTS_END and not self.engine.reserve(found.status, state):
                     return found
             except SimulationError:
-                self.evaluate(state)  # as the next attempt finds the same, steps made before it count
                 if not found.done:
                     raise
+                self.evaluate(state)  # as the next attempt finds the same, steps made before it count
                 return found
 
     def _why(self, found: IntegrationReport, begin: float) -> str:

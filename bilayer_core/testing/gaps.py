@@ -5,7 +5,7 @@ half edges. All pairs are looked at, without lists of near ones, but for robots 
 scipy's k-d tree finds anew at every look; distances are computed by other formulas. Rods may meet unless the scene has
 `contact.rods: false`, whether or not the model expects it.
 
-- Surfaces are met by ribbons as they are (`testing.ribbons`), by balls, and by the corners and rims of bodies
+- Surfaces are met by ribbons as they are (`testing.ribbons`), by balls, and by corners and rims of bodies and obstacles
   (`testing.surfaces`).
 - Rods meet rods as ribbons straight between stations, and those up to twice as wide as thick as round ones about the
   middle between their faces. On one rod, edges count that are at least two edges apart along it, and half the
@@ -37,7 +37,7 @@ from scipy.spatial.transform import Rotation
 from bilayer_core.model.model import Model
 from bilayer_core.observed.frame import Frame
 from bilayer_core.testing.ribbons import Ribbons, Sheet
-from bilayer_core.testing.surfaces import BodyPoints, surfaces_of
+from bilayer_core.testing.surfaces import BodyPoints, SceneSurface, surfaces_of
 
 Array = np.ndarray
 MOST_EDGES = 300
@@ -78,8 +78,10 @@ class GapCheck:
     def __init__(self, model: Model):
         self._model = model
         self._pairs = PairsOfEdges(model) if model.scene.contact and model.scene.contact.rods is not False else None
-        self._points, self._ribbons = BodyPoints(model), Ribbons(model)
-        self._surfaces = surfaces_of(model, self._points)
+        self._points, self._ribbons = BodyPoints(model.scene), Ribbons(model)
+        self._surfaces = surfaces_of(model.scene) if model.scene.contact is not None else []
+        self._touching = [self._points.meeting(surface) for surface in self._surfaces]
+        self._nodes = [self._nodes_meeting(surface) for surface in self._surfaces]
         edge = model.rods.edge_node
         wide = _wide_rods(model)
         self._has_width, self._rod_of_edge = np.zeros(len(edge)), np.empty(len(edge), dtype=object)
@@ -88,7 +90,7 @@ class GapCheck:
             own = slice(strand.first_edge, strand.first_edge + strand.node_count - 1)
             self._has_width[own], self._rod_of_edge[own] = strand.rod in wide, strand.rod
             self._station_of_edge[own] = strand.first_station + np.arange(strand.node_count - 1)
-        self._meeting = [np.flatnonzero(of.nodes[edge] & of.nodes[edge + 1]) for of in self._surfaces]
+        self._meeting = [np.flatnonzero(nodes[edge] & nodes[edge + 1]) for nodes in self._nodes]
         self._smallest_radius = float(self._ribbons.radius[model.node_length > 0.0].min())
         if self._pairs:
             self._leave_out_joined(self._ribbons.sections_of(model.start_position, model.start_director1))
@@ -107,6 +109,16 @@ class GapCheck:
         joined = self._pairs.joined(first, second) & (gaps < self._model.scene.contact.barrier_distance)
         self._pairs.leave_out(start[0], joined | (self._pairs.of_one_rod(first, second) & (gaps <= 0.0)))
 
+    def _nodes_meeting(self, surface: SceneSurface) -> Array:
+        """Return which nodes of rods can meet a surface, shape (n_node,)."""
+        model, bodies = self._model, self._model.bodies
+        base = np.append(bodies.start_position, np.zeros((1, 3)), axis=0)[surface.body]
+        turned = np.append(bodies.start_rotation, np.eye(3)[None], axis=0)[surface.body]
+        middle, half = self._ribbons.sections_of(model.start_position[: model.node_count], model.start_director1)
+        places = np.stack([middle - half, middle, middle + half]) - base - turned @ surface.position
+        gaps = surface.distance((places @ turned @ surface.rotation).reshape(-1, 3)).reshape(3, -1).min(axis=0)
+        return self._points.nodes_meeting(model, surface, gaps - self._ribbons.radius)
+
     @property
     def checks_anything(self) -> bool:
         """True if the scene has anything that could meet."""
@@ -121,7 +133,7 @@ class GapCheck:
         poses.append((np.zeros(3), np.eye(3)))  # the world
         return Moment(
             self._ribbons.sections(frame),
-            self._points.places(frame),
+            self._points.places(poses),
             np.array([poses[s.body][0] + poses[s.body][1] @ s.position for s in self._surfaces]).reshape(-1, 3),
             np.array([poses[s.body][1] @ s.rotation for s in self._surfaces]).reshape(-1, 3, 3),
         )
@@ -201,8 +213,8 @@ class GapCheck:
         rods = _parts(_largest(moved[0]) + _largest(moved[1]), self._smallest_radius) if self._pairs else 0
         points, positions = at.points - before.points, at.surface_position - before.surface_position
         surfaces = [
-            _parts(max(_largest(points[of.points] - way), self._way(moved[:, of.nodes], way)), of.smallest)
-            for of, way in zip(self._surfaces, positions, strict=True)
+            _parts(max(_largest(points[touching] - way), self._way(moved[:, nodes], way)), of.smallest)
+            for of, touching, nodes, way in zip(self._surfaces, self._touching, self._nodes, positions, strict=True)
         ]
         ends = list(zip(vars(before).values(), vars(at).values(), strict=True))
         for part in np.linspace(0.0, 1.0, max([rods, *surfaces]) + 1)[1:-1]:
@@ -251,7 +263,8 @@ class GapCheck:
         found = []
         for number, surface in enumerate(self._surfaces):
             place = at.surface_position[number], at.surface_rotation[number]
-            of_bodies = surface.distance((at.points[surface.points] - place[0]) @ place[1]) - surface.radii
+            touching = self._touching[number]
+            of_bodies = surface.distance((at.points[touching] - place[0]) @ place[1]) - self._points.radius[touching]
             unit = self._model.scene.contact.barrier_distance
             of_ribbons = sheet.least_gap(self._meeting[number], surface, place, unit, enough)
             found.append(min(of_ribbons, float(of_bodies.min(initial=math.inf))))

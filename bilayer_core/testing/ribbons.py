@@ -21,7 +21,7 @@ import numpy as np
 from bilayer_core.model.model import Model
 from bilayer_core.observed.frame import Frame
 from bilayer_core.testing.rectangles import Rectangles, apart, apart_at_least
-from bilayer_core.testing.surfaces import MetSurface
+from bilayer_core.testing.surfaces import SceneSurface
 
 Array = np.ndarray
 FINE = 0.02
@@ -133,13 +133,13 @@ class Sheet:
         second = 6.0 * np.linalg.norm(np.diff(self.points, 2, axis=2), axis=3).max(axis=2)
         return first.sum(axis=0), size[1].max(axis=1), second.sum(axis=0), first[1]
 
-    def least_gap(self, edges: Array, surface: MetSurface, place: tuple[Array, Array], unit: float, enough: float):
+    def least_gap(self, edges: Array, surface: SceneSurface, place: tuple[Array, Array], unit: float, enough: float):
         """Return the least gap of some stretches to a surface [m], or a number not below `enough` if it is larger.
 
         Parameters
         ----------
         edges : Array
-        surface : MetSurface
+        surface : SceneSurface
         place : tuple of Array
             Position and rotation of the surface.
         unit : float

@@ -63,7 +63,7 @@ def test_a_strip_presses_a_flat_face_with_the_points_and_the_gap_that_a_plane_ha
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_the_friction_of_a_box_is_integrated_along_edges(dimension):
-    assert stride(0.4, 0.5, 21, box("ground", (0.05, 0, -0.01), (0.3, 0.05, 0.02)), dimension)[0] == pytest.approx(
+    assert stride(0.4, 0.5, 21, (box("ground", (0.05, 0, -0.01), (0.3, 0.05, 0.02)),), dimension)[0] == pytest.approx(
         stride(0.4, 0.5, 21, dimension=dimension)[0], rel=1e-6
     )
 

@@ -79,14 +79,13 @@ def loose(seed, noise=5e-5):
 def test_contact_of_unlike_layers_exerts_no_net_force_and_no_moment():
     problem = loose(3)
     evaluator, layout, rods = problem.evaluator, problem.model.layout, problem.model.rods
+    evaluator.start_stage(problem.at)  # friction is frozen there
     for force in ("rod barrier", "rod friction"):
         assert evaluator.evaluate(problem.at, (force,))[force] > 0.0
         gradient = evaluator.sums.gradient
         of_nodes = gradient[layout.node[:, None] + np.arange(3)]
         scale = np.abs(of_nodes).sum()
         assert np.abs(of_nodes.sum(axis=0)).max() < 1e-13 * scale
-        if force == "rod friction":
-            continue  # it acts on the middles, at a distance: see `forces.rod_contact`
         moment = np.cross(problem.at.position, of_nodes).sum(axis=0)
         moment += gradient[layout.edge] @ problem.at.tangent[: rods.edge_count]
         assert np.abs(moment).max() < 1e-13 * scale * 0.02
@@ -194,6 +193,28 @@ def test_strips_of_unlike_layers_rest_on_each_other_with_their_faces(model):
     simulator.run(0.3)
     judge = GapCheck(simulator.model)
     assert judge.smallest(judge.moment(simulator.frame())) == pytest.approx(d_hat, rel=0.02)
+
+
+@pytest.mark.parametrize("stations", [(9, 9), (21, 34)])
+def test_ribbons_press_with_a_part_of_the_stiffness_where_a_border_alone_touches(stations):
+    width, thickness, gap, d_hat = 0.01, 2e-3, 0.6e-4, 2e-4
+    over = {"face on face": (0, 0, thickness + gap), "border on border": (0, width + gap, 0)}
+    over["border on face"] = (0, 0.2 * width, 0.5 * (width + thickness) + gap)
+    pressed = {}
+    for place, start in over.items():
+        low, high = (rod([layer(thickness=thickness)], stations=n) for n in stations)
+        high["path"]["start"] = list(start)
+        high["normal"] = [0, 1, 0] if place == "border on face" else [0, 0, 1]
+        content = scene([low | {"name": "low"}, high | {"name": "high"}], contact={**contact(d_hat), "rods": True})
+        problem = Problem(content, np.random.default_rng(0), "laminate", noise=0.0, origin_noise=0.0, turns=0.0)
+        problem.evaluator.evaluate(problem.start, ("rod barrier",))
+        of_nodes = problem.evaluator.sums.gradient[problem.model.layout.node[:, None] + np.arange(3)]
+        pressed[place] = -of_nodes[stations[0] :].sum(axis=0) / 0.1
+    s = gap - d_hat
+    whole = 1e7 * (2.0 * s * np.log(gap / d_hat) + s * s / gap)
+    assert pressed["face on face"] == pytest.approx([0.0, 0.0, whole], rel=1e-9, abs=1e-6 * whole)
+    assert pressed["border on border"] == pytest.approx([0.0, 0.25 * whole, 0.0], rel=1e-9, abs=1e-6 * whole)
+    assert pressed["border on face"] == pytest.approx([0.0, 0.0, 0.125 * whole], rel=0.01, abs=1e-6 * whole)
 
 
 def test_ribbons_pushed_against_each_other_on_the_ground_stop_edge_to_edge():

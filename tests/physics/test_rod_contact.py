@@ -21,9 +21,11 @@ def dense(contacts, nodes):
         places = [i, i + 1, j, j + 1]
         w, m, a = contacts.weight[c], contacts.matrix[c], contacts.foot_gradient[c]
         side = contacts.tangential_stiffness[c] if contacts.inner[c] else 0.0
+        turn = contacts.turn[c, :, :3].reshape(2, 3, 3)  # of friction
+        rate = [w[k] * np.eye(3) + (-1.0, 1.0)[k % 2] * turn[k // 2] for k in range(4)]
         for k, row in enumerate(places):
             for n, column in enumerate(places):
-                hessian[row, :, column, :] += w[k] * w[n] * m - side * np.outer(a[k], a[n])
+                hessian[row, :, column, :] += rate[k].T @ m @ rate[n] - side * np.outer(a[k], a[n])
     return hessian.reshape(3 * nodes, 3 * nodes)
 
 
@@ -114,6 +116,21 @@ def test_friction_between_rods_is_opposite_on_the_two_and_a_part_of_what_presses
     assert first[0] == pytest.approx(-0.4 * load, rel=0.05)  # normals lean by the noise of the shape
 
 
+def test_friction_between_round_rods_exerts_no_net_force_and_no_moment():
+    problem = Problem(closer(pressed(None)), np.random.default_rng(2), h=1e-5, noise=5e-5, origin_noise=1e-6, turns=0.1)
+    evaluator, layout, rods = problem.evaluator, problem.model.layout, problem.model.rods
+    assert not problem.model.rails.exists
+    evaluator.start_stage(problem.at)  # friction is frozen there
+    assert evaluator.evaluate(problem.at, ("rod friction",))["rod friction"] > 0.0
+    gradient = evaluator.sums.gradient
+    of_nodes = gradient[layout.node[:, None] + np.arange(3)]
+    scale = np.abs(of_nodes).sum()
+    moment = np.cross(problem.at.position, of_nodes).sum(axis=0)
+    moment += gradient[layout.edge] @ problem.at.tangent[: rods.edge_count]
+    assert np.abs(of_nodes.sum(axis=0)).max() < 1e-13 * scale
+    assert np.abs(moment).max() < 1e-13 * scale * 0.02
+
+
 MESHES = [(3, 3), (11, 12), (21, 38), (81, 55)]
 
 
@@ -129,16 +146,22 @@ def test_parallel_ribbons_press_on_each_other_with_the_same_force_on_any_meshes(
 
 
 def pressed(hub):
-    """Two bilayer arms of a hub, bent onto each other, and a third rod across them; held nodes take part in contact."""
+    """Two bilayer arms of a hub, bent onto each other, and a third rod across them; held nodes take part in contact.
+
+    Without a hub nothing holds them.
+    """
     arms = rod(
         [layer("bottom"), layer("top")], length=0.02, stations=7, start=(0, 0, 0.5e-3), name="arm", clamp_start="hub"
     )
     under = {**rod([layer()], length=0.02, stations=8, start=(-0.004, 1e-4, -2.6e-3), name="under")}
     held = {**rod([layer()], length=0.015, stations=5, start=(0, 0, -5.2e-3), name="held"), "clamp_start": "hub"}
     motion = {"type": "prescribed"} if hub == "prescribed" else {"type": "free", "mass": 1e-3, "inertia": [2e-8] * 3}
-    bodies = [{"name": "hub", "position": [0, 0, 0], "motion": motion}]
+    bodies = [{"name": "hub", "position": [0, 0, 0], "motion": motion}] if hub else []
     law = {**contact(coefficient=0.4, speed_threshold=0.1), "rods": True}
-    return scene([{**each, "width": WIDTH} for each in (arms, under, held)], bodies=bodies, contact=law)
+    rods = [{**each, "width": WIDTH} for each in (arms, under, held)]
+    if not hub:
+        rods = [{key: value for key, value in each.items() if key != "clamp_start"} for each in rods]
+    return scene(rods, bodies=bodies, contact=law)
 
 
 def without_elasticity(model):

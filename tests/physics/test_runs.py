@@ -7,6 +7,7 @@ from support.sample_scenes import everything
 from bilayer_core import Simulator, load_scene, read_log
 from bilayer_core.errors import InputError
 from bilayer_core.runs.replay import verify
+from bilayer_core.simulation import stepper
 from bilayer_core.simulation.run_result import Termination
 
 
@@ -189,3 +190,52 @@ def test_overrides_that_are_none_are_refused(overrides, fault):
 
     with pytest.raises(SceneError, match=fault):
         load_scene(everything(), overrides)
+
+
+def in_passes(monkeypatch, count):
+    """The way of a run in which steps pause after so many passes of Newton's method, and how often they did."""
+    if count:
+        monkeypatch.setattr(stepper, "PERIOD", 0.0)
+        monkeypatch.setattr(stepper, "FIRST_PASSES", count)
+        monkeypatch.setattr(stepper, "PATIENCE", 1)
+    simulator, pauses = Simulator(load_scene("jumping")), []
+    simulator.run(0.02, interrupted=lambda: pauses.append(simulator.time))
+    return simulator, len(pauses)
+
+
+def test_a_run_whose_steps_pause_ends_as_one_whose_steps_do_not(monkeypatch):
+    whole, asked = in_passes(monkeypatch, None)
+    assert whole.statistics.rejected > 2
+    for passes in (1, 4):
+        paused, pauses = in_passes(monkeypatch, passes)
+        assert pauses > asked + 20
+        np.testing.assert_array_equal(paused.save_state(), whole.save_state())
+        for name in ("steps", "rejected", "iterations"):
+            assert getattr(paused.statistics, name) == getattr(whole.statistics, name)
+
+
+@pytest.mark.parametrize("ends", ["by what is asked", "by an exception"])
+def test_a_run_can_end_within_a_step_which_leaves_the_state_as_it_was(monkeypatch, ends):
+    monkeypatch.setattr(stepper, "FIRST_PASSES", 1)
+    simulator = Simulator(load_scene("jumping"))
+    simulator.compile()
+    before, gap, looks = simulator.save_state(), simulator.frame().min_gap, []
+
+    def ended():
+        if ends == "by an exception":
+            raise KeyboardInterrupt
+        return True
+
+    if ends == "by an exception":
+        with pytest.raises(KeyboardInterrupt):
+            simulator.run(0.02, interrupted=ended)
+    else:
+        result = simulator.run(0.02, interrupted=ended, each_step=looks.append)
+        assert result.termination is Termination.INTERRUPTED
+    assert not looks
+    np.testing.assert_array_equal(simulator.save_state(), before)
+    assert simulator.frame().min_gap == gap
+    simulator.run(0.02)
+    other = Simulator(load_scene("jumping"))
+    other.run(0.02)
+    np.testing.assert_array_equal(simulator.save_state(), other.save_state())

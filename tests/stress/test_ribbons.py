@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from bilayer_core.testing.rectangles import Rectangles, apart
 from bilayer_core.testing.ribbons import FINE, Sheet
-from bilayer_core.testing.surfaces import MetSurface
+from bilayer_core.testing.surfaces import SceneSurface
 
 UNIT, STRETCHES, LENGTH = 2e-4, 8, 0.06
 NONE = np.empty(0)
@@ -39,7 +39,7 @@ def test_the_least_gap_is_that_of_a_dense_search(kind, seed):
     random = np.random.default_rng(seed)
     sheet, half = ribbon(random), size_of(kind, random)
     rounding = half[0] if kind == "sphere" else 0.3 * half.min() * (seed % 2)
-    surface = MetSurface(kind, 0, kind, half, rounding, NONE, NONE, NONE, NONE, NONE)
+    surface = SceneSurface(kind, 0, kind, half, rounding, NONE, NONE)
     place = random.uniform([0.0, -0.02, -0.02], [LENGTH, 0.02, 0.03]), Rotation.random(random_state=seed).as_matrix()
     grid = np.meshgrid(np.arange(STRETCHES), np.linspace(0.0, 1.0, 61), np.linspace(-1.0, 1.0, 121), indexing="ij")
     x, radius = sheet.at(*(of.ravel() for of in grid))

@@ -83,10 +83,14 @@ class Rods:
             self.evaluator.stage.origin_position[:] = origin
 
     def evaluate(self, position, force="rod barrier"):
-        """Energy and gradient."""
+        """Energy and gradient by nodes, edges between them included."""
         self.at.position[:] = position
         energy = self.evaluator.forces(self.at, (force,))[force]
-        return energy, self.evaluator.sums.node.copy()
+        sums, rods = self.evaluator.sums, self.evaluator.model.rods
+        gradient, by_edge = sums.node.copy(), sums.edge[: rods.edge_count, :3]
+        np.add.at(gradient, rods.edge_node + 1, by_edge)
+        np.subtract.at(gradient, rods.edge_node, by_edge)
+        return energy, gradient
 
     def bound(self, position, node_step):
         """How far a step of nodes may go."""

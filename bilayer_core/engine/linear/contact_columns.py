@@ -1,9 +1,9 @@
 """Contact between rods in the Newton matrix.
 
 A contact couples the edge (i, i+1) of a point with the edge (j, j+1) that it faces, which are far from each other in
-the band. What moves either *side* are the unknowns of the two nodes of its edge, and where these have rails
-(`contact.rails`) those of the nodes beside them and of three edges. With r the vector between the two places and M,
-κ and a as in `forces.rod_contact`, the contact adds
+the band. What moves either *side* are the unknowns of the two nodes of its edge, with friction the turn of the edge as
+well, and where these have rails (`contact.rails`) those of the nodes beside them and of three edges. With r the vector
+between the two places and M, κ and a as in `forces.rod_contact`, the contact adds
 
     ∂rᵀ M ∂r − κ (|e| ∂t)ᵀ (|e| ∂t),    ∂r = Σ w_m ∂y_m,    |e| ∂t = Σ a_m·∂y_m
 
@@ -48,7 +48,8 @@ def take_rod_contacts(p, simplified):
     columns.contacts = columns.unknowns = 0
     for part in range(2):
         rate = rods.rails.rate if part == 0 else rods.rails.slip_rate
-        _list_contacts(columns, rods.rails, rate, p.strands, simplified, rods.contacts if part == 0 else rods.sliding)
+        contacts = rods.contacts if part == 0 else rods.sliding
+        _list_contacts(columns, rods.rails, rate, p.strands, simplified, contacts, part == 1)
     if columns.contacts > 0:
         _add_own_sides(columns, p.system.band)
         _choose_unknowns(columns)
@@ -58,7 +59,7 @@ def take_rod_contacts(p, simplified):
 
 
 @kernel
-def _list_contacts(columns, rails, rate, strands, simplified, contacts):
+def _list_contacts(columns, rails, rate, strands, simplified, contacts, slides):
     """Append contacts to the list, with what moves their sides."""
     begin, half = columns.contacts, columns.unknown.shape[1] // 2
     normal, direction, matrix = contacts.normal, contacts.segment_direction, stack_matrix(3, 3)
@@ -81,6 +82,8 @@ def _list_contacts(columns, rails, rate, strands, simplified, contacts):
                 _list_rails(columns, rails, rate, strands, contacts, c, e, side)
             else:
                 _list_nodes(columns, strands, contacts, c, e, side)
+            if slides:
+                _list_turn(columns, rails, strands, contacts, c, e, side)
         for a in range(2 * half):
             r0, r1, r2 = columns.rate[e, 0, a], columns.rate[e, 1, a], columns.rate[e, 2, a]
             for m in range(3):
@@ -100,16 +103,40 @@ def _subtract(matrix, factor, v0, v1, v2):
 @kernel
 def _list_nodes(columns, strands, contacts, c, e, side):
     """List the unknowns of the nodes of one side, and what moves with them."""
-    axes, dimension = strands.axes, strands.axes.shape[0]
+    axes, dimension, half = strands.axes, strands.axes.shape[0], columns.unknown.shape[1] // 2
+    begin = side * half
+    for a in range(begin + 2 * dimension, begin + half):
+        columns.unknown[e, a] = -1
+        columns.rate[e, 0, a] = columns.rate[e, 1, a] = columns.rate[e, 2, a] = columns.foot[e, a] = 0.0
     for m in range(2):
         weight, node = contacts.weight[c, 2 * side + m], contacts.node[c, side] + m
         for x in range(dimension):
-            a, along = dimension * (2 * side + m) + x, 0.0
+            a, along = begin + dimension * m + x, 0.0
             columns.unknown[e, a] = strands.row[node] + x
             for n in range(3):
                 columns.rate[e, n, a] = weight * axes[x, n]
                 along += contacts.foot_gradient[c, 2 * side + m, n] * axes[x, n]
             columns.foot[e, a] = along
+
+
+@kernel
+def _list_turn(columns, rails, strands, contacts, c, e, side):
+    """Add to what moves with the unknowns of one side how friction's place moves with its edge."""
+    axes, dimension, turn = strands.axes, strands.axes.shape[0], contacts.turn
+    first, angle = side * (columns.unknown.shape[1] // 2), 2 * dimension
+    if rails.exists:  # the node and the edge before come first
+        first, angle = first + dimension, 3 * dimension + 1
+    for n in range(3):
+        for x in range(dimension):
+            moved = 0.0
+            for d in range(3):
+                moved += turn[c, 3 * side + n, d] * axes[x, d]
+            columns.rate[e, n, first + x] -= moved
+            columns.rate[e, n, first + dimension + x] += moved
+    if dimension == 3:
+        columns.unknown[e, first + angle] = strands.edge_unknown[contacts.edge[c, side]]
+        for n in range(3):
+            columns.rate[e, n, first + angle] += turn[c, 3 * side + n, 3]
 
 
 @kernel

@@ -156,10 +156,12 @@ class RodContactList:
     gap: Vector = ("contact",)  # d [m]
     distance: Vector = ("contact",)  # D [m]
     node: IndexTable = ("contact", 2)  # i and j
+    edge: IndexTable = ("contact", 2)  # from these
     right: IndexTable = ("contact", 2)  # rails of their right borders, −1 of round rods
     weight: Matrix = ("contact", "leg")  # w_m, of right borders last
     normal: Matrix = ("contact", 3)  # n
     normal_force: Vector = ("contact",)  # λ [N]; those of friction alone
+    turn: Stack = ("contact", 6, 4)  # of friction's place, from either middle, by the vector and turn of its edge
     matrix: Stack = ("contact", 3, 3)  # M [N/m]
     tangential_stiffness: Vector = ("contact",)  # κ [N/m]
     segment_direction: Matrix = ("contact", 3)  # u

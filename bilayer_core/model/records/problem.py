@@ -135,6 +135,10 @@ class Outcome:
     """Results of a piece beside the number that it returns."""
 
     status: int = CHANGES  # how it ended, from `model.records.status`
+    passes: int = (
+        CHANGES  # through the loop of Newton's method that may still be made before the next attempt at a step
+    )
+    patience: int = CHANGES  # how many more end an attempt
     pair: int = CHANGES  # near pair that blocks motion, −1 without one
     configuration: int = CHANGES  # the last one
     swapped: bool = CHANGES  # whether the scratch is the minimum

@@ -11,6 +11,8 @@ BORDER_CAPACITY_EXCEEDED = 3
 """Contacts of rods have more columns than the border has capacity for."""
 INPUTS_END = 4
 """What acts from outside is not known as far as the step reaches."""
+PAUSED = 6
+"""Newton's method has made as many passes as were allowed for now."""
 CONVERGED, MAX_ITERATIONS, LINE_SEARCH, INDEFINITE, NOT_FINITE, BLOCKED, BEYOND, UNSETTLED, COLLAPSED, CROSSED = (
     5,
     10,

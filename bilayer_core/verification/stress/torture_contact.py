@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from bilayer_core.testing.surfaces import BodyPoints, surfaces_of
+from bilayer_core.testing.surfaces import surfaces_of
 from bilayer_core.testing.trial import Trial
 from bilayer_core.verification.stress.ladder import Rung, Torture, first_broken
 from bilayer_core.verification.stress.linking import gauss_integral, longer
@@ -88,7 +88,7 @@ def clears_edges(trial: Trial) -> Decision:
     """Return the smallest gap over the barrier distance of whole edges, not only of their stations."""
     simulator, smallest = trial.simulator, math.inf
     model = simulator.model
-    surfaces = surfaces_of(model, BodyPoints(model))
+    surfaces = surfaces_of(simulator.scene)
     radius, barrier = 0.5 * simulator.scene.rods[0].layers[0].thickness, simulator.scene.contact.barrier_distance
     parts = np.linspace(0.0, 1.0, ALONG)[:, None, None]
 

@@ -209,7 +209,11 @@ STRAIN, STRIP = 0.05, 0.1
 
 
 def stride(
-    forward: float, backward: float, stations: int, ground: dict = GROUND, dimension: int | str = "auto"
+    forward: float,
+    backward: float,
+    stations: int,
+    obstacles: tuple[dict, ...] = (GROUND,),
+    dimension: int | str = "auto",
 ) -> tuple[float, float]:
     """Return the way of the middle of a strip [mm] that extends evenly and goes back, and what it must be.
 
@@ -225,7 +229,7 @@ def stride(
         materials={"film": {"youngs_modulus": 1e9, "poisson_ratio": 0.5, "density": 1000.0}},
         gravity=[0, 0, -GRAVITY],
         stimuli={"pulse": {"schedule": {"type": "table", "times": [0, 1, 2], "values": [0, 1, 0]}}},
-        obstacles=[ground],
+        obstacles=list(obstacles),
         contact=law,
         start="settle",
         duration=2.2,
@@ -235,6 +239,84 @@ def stride(
     simulator.run()
     middle = simulator.rods["rod"].positions[stations // 2, 0] - 0.5 * STRIP
     return 1e3 * float(middle), 1e3 * STRAIN * STRIP * (backward - forward) / (backward + forward)
+
+
+SLIDER = {"length": 0.02, "thickness": 4e-3, "coefficient": 0.5}
+"""A stiff strip that slides over the ground or along a strip that is held."""
+
+
+def _box(begin: float, end: float) -> dict:
+    """Return a box between two places along x [m] whose top is that of the ground."""
+    place = [0.5 * (begin + end), 0, -0.01]
+    return {"name": "box", "type": "box", "position": place, "size": [end - begin, 0.05, 0.02]}
+
+
+ON_BOXES = {"on a box": (_box(-0.1, 0.2),), "from a box onto the ground": (_box(-0.1, 0.0237), GROUND)}
+"""Obstacles under strips that crawl, but for the ground alone; the box ends between stations, away from what rests."""
+
+
+def shift_of_pressure(under: str, width: float, dimension: int) -> tuple[float, float]:
+    """Return how far before its middle a sliding strip presses on what is below it [mm], and what it must be.
+
+    Friction μ N acts on its face, h below its mass centre, and the pressure must balance its moment μ N h.
+    """
+    length, thickness, coefficient = SLIDER.values()
+    start = (0, 0, 0.5 * thickness + 1.9e-4)
+    slider = rod([layer(thickness=thickness, material="stiff")], length, 11, start, "slider", width)
+    slider["velocity"] = [0.6, 0, 0]
+    content = scene(
+        [slider],
+        solver={"dimension": dimension, "model": "laminate"},
+        materials={"stiff": {"youngs_modulus": 1e10, "poisson_ratio": 0.5, "density": 1000.0}},
+        gravity=[0, 0, -GRAVITY],
+        contact=contact(2e-4, coefficient) | {"stiffness": 1e7},
+    )
+    if under == "ground":
+        content["obstacles"] = [GROUND]
+    else:
+        ends = {"clamp_start": "left", "clamp_end": "right"}
+        low = (-length, 0, -0.5 * thickness)
+        held = rod([layer(thickness=thickness, material="stiff")], 4 * length, 33, low, "held", width, **ends)
+        content["rods"].append(held)
+        content["bodies"] = [fixed("left", low), fixed("right", (3 * length, 0, low[2]))]
+    simulator = Simulator(load_scene(content))
+    simulator.run(0.1)  # the rocking has died away by then
+    view = simulator.rods["slider"]
+    force, place = simulator.contact_forces[: len(view.positions), 2], view.positions
+    gap = 0.0 if under == "ground" else float(simulator.frame().min_gap)
+    found = float(force @ place[:, 0] / force.sum() - place[:, 0].mean())
+    return 1e3 * found, 1e3 * coefficient * 0.5 * (thickness + gap)
+
+
+def rolling_on_rods() -> tuple[float, float]:
+    """Return the speed [m/s] after 0.1 s of a round rod that rolls down two others, and g sin β t/(1 + ½ (r/R)²); R is
+    the distance of its axis from the middle of the gap.
+    """
+    radius, slope, time, ends = 2e-3, 0.1, 0.1, (-0.02, 0.1)
+    rods, bodies = [], []
+    for side, y in (("left", -0.01), ("right", 0.01)):
+        names = [f"{side}_{end}" for end in ("start", "end")]
+        bodies += [fixed(name, (x, y, -radius)) for name, x in zip(names, ends, strict=True)]
+        clamps = dict(zip(("clamp_start", "clamp_end"), names, strict=True))
+        below, length = [layer(thickness=2.0 * radius, material="stiff")], ends[1] - ends[0]
+        rods.append(rod(below, length, 33, (ends[0], y, -radius), f"{side}_rail", 2.0 * radius, **clamps))
+    across = rod([{"name": "only", "material": "stiff"}], 0.04, 9, (0, -0.02, radius + 1.9e-4), "roller")
+    across["path"]["direction"] = [0, 1, 0]
+    del across["width"]
+    content = scene(
+        [*rods, across | {"radius": radius}],
+        solver={"model": "laminate"},
+        bodies=bodies,
+        materials={"stiff": {"youngs_modulus": 1e10, "poisson_ratio": 0.5, "density": 1000.0}},
+        gravity=[GRAVITY * math.sin(slope), 0, -GRAVITY * math.cos(slope)],
+        contact=contact(2e-4, 0.5, 1e-5),
+    )
+    simulator = Simulator(load_scene(content))
+    simulator.run(time)
+    roller = simulator.model.strands[-1].first_node
+    rolls_about = radius + 0.5 * float(simulator.frame().min_gap)
+    speed = float(simulator.velocities[roller:, 0].mean())
+    return speed, GRAVITY * math.sin(slope) * time / (1.0 + 0.5 * (radius / rolls_about) ** 2)
 
 
 def pulled_by_own(rule: str) -> tuple[float, float]:
@@ -315,6 +397,39 @@ CASES = [
         )
         for forward, backward in ((0.4, 0.5), (0.2, 0.8))
         for stations in (21, 41, 81)
+    ),
+    *(
+        Case(
+            f"friction/stride {name}/0.4 and 0.5, {stations} stations",
+            "ε L (μ₋ − μ₊)/(μ₋ + μ₊), by the place where an evenly extending strip rests",
+            0.01,
+            lambda obstacles=obstacles, stations=stations: stride(0.4, 0.5, stations, obstacles),
+            "mm",
+        )
+        for name, obstacles in ON_BOXES.items()
+        for stations in (21, 41)
+    ),
+    *(
+        Case(
+            f"friction/pressure under a sliding strip/{name}, {dimension}-D",
+            "μ h before its middle, at the height h of its mass centre over its face",
+            1e-3,
+            lambda under=under, width=width, dimension=dimension: shift_of_pressure(under, width, dimension),
+            "mm",
+        )
+        for name, under, width in (
+            ("on the ground", "ground", 1e-2),
+            ("on a ribbon", "strip", 1e-2),
+            ("round on round", "strip", 4e-3),
+        )
+        for dimension in (2, 3)
+    ),
+    Case(
+        "friction/round rod that rolls down two others",
+        "g sin β t/(1 + ½ (r/R)²), R from its axis to the middle of the gap",
+        2e-3,
+        rolling_on_rods,
+        "m/s",
     ),
     *(
         Case(
