@@ -96,7 +96,8 @@ def _parts(scene) -> dict[str, list[str]]:
     parts = {}
     for rod in scene.rods:
         copies = f"{rod.pattern.copies} of them, each " if rod.pattern else ""
-        wide = f"{_millimetres(extremes(rod.width))} wide"
+        widths = dict.fromkeys(_millimetres(extremes(rod.width_of(layer))) for layer in rod.layers)
+        wide = f"{' and '.join(widths)} wide"
         if rod.radius is not None:
             hole = f", hole {_millimetres(extremes(rod.inner_radius))}" if rod.inner_radius != 0.0 else ""
             wide = f"round, radius {_millimetres(extremes(rod.radius))}{hole}"

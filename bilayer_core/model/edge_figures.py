@@ -57,7 +57,8 @@ class EdgeFigures:
         self.eigenstrain, self.eigenstrain_across = np.zeros_like(self._layers), np.zeros_like(self._layers)
         self.eigenstrain_range = np.zeros((2, *self._layers.shape))
         for index, layer in enumerate(rod.layers):
-            stiffness = values_at(layer.stiffness, rod.edge_length * stations)
+            along = rod.edge_length * stations
+            stiffness = values_at(layer.stiffness, along) * values_at(rod.width_of(layer), along) / self.width
             material = scene.materials[layer.material]
             self._moduli[index] = stiffness * material.youngs_modulus
             self._shear_moduli[index] = self._moduli[index] / (2.0 * (1.0 + material.poisson_ratio))

@@ -56,6 +56,8 @@ class Layer(Part):
     """One of `materials`."""
     thickness: varying(PositiveLength) | None = None
     """Through the bond. Must be given, but for a round rod (`radius`)."""
+    width: varying(PositiveLength) | None = None
+    """Of this layer, in the middle of the rod's; that of the rod by default."""
     interval: tuple[NonNegativeLength, PositiveLength] | None = None
     """From and to, as lengths along the path [m]."""
     eigenstrain: Eigenstrains = []
@@ -96,7 +98,9 @@ class Rod(Part):
     name: Name
     """Unique among rods, bodies and obstacles."""
     width: varying(PositiveLength) | None = None
-    """Of its rectangular section, across path and normal. Must be given, but for a round rod."""
+    """Of its rectangular section, across path and normal. Must be given, but for a round rod, and where each layer has
+    one.
+    """
     radius: varying(PositiveLength) | None = None
     """Of a round rod of one layer, in place of width and thickness."""
     inner_radius: varying(NonNegativeLength) = 0.0
@@ -138,6 +142,15 @@ class Rod(Part):
     """At the start, of a rod that nothing holds; others move as what holds them, or as the scene says."""
     angular_velocity: AngularVelocity | None = None
     """Likewise, about the rod's mass centre."""
+
+    def width_of(self, layer: Layer) -> float | Profile:
+        """Return the width of a layer [m]."""
+        return self.width if layer.width is None else layer.width
+
+    @property
+    def widest(self) -> float:
+        """Largest width of its layers [m]."""
+        return max(extremes(self.width_of(layer))[1] for layer in self.layers)
 
     @property
     def edge_length(self) -> float:
@@ -311,8 +324,7 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
             faults.append((("imperfection", "size"), rod.imperfection.size, demand))
     for index, layer in enumerate(rod.layers):
         faults += _bent_across(rod, index)
-        varying = ("thickness", "stiffness", "natural_curvature", "natural_curvature_across", "natural_twist")
-        faults += _profiles(layer, ("layers", index), varying, rod.path.length)
+        faults += _profiles(layer, ("layers", index), VARYING, rod.path.length)
         for number, law in enumerate(layer.eigenstrain):
             where: Location = ("layers", index, "eigenstrain", number, "interval")
             if law.interval is not None and not is_ordered(law.interval):
@@ -346,7 +358,12 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
 def _sections(rod: Rod) -> Iterator[Fault]:
     """Yield the faults of what a rod's sections are given by; the width and thickness of a round one are written."""
     layers = [((), rod, "width"), *((("layers", k), layer, "thickness") for k, layer in enumerate(rod.layers))]
+    own = [(("layers", k, "width"), layer.width) for k, layer in enumerate(rod.layers) if layer.width is not None]
     if rod.radius is None:
+        if len(own) == len(rod.layers):
+            if rod.width is not None:
+                yield ("width",), rod.width, "must be left out: each layer has a `width` of its own"
+            del layers[0]
         for where, part, key in layers:
             if getattr(part, key) is None:
                 yield (*where, key), None, "must be given (a length [m], such as 2 mm), but for a round rod (`radius`)"
@@ -356,6 +373,8 @@ def _sections(rod: Rod) -> Iterator[Fault]:
     if len(rod.layers) == 2:
         yield ("radius",), rod.radius, "must be left out: a rod of two layers has rectangular sections"
         return
+    for where, width in own:
+        yield where, width, "must be left out: the rod has a `radius`"
     diameter = doubled(rod.radius)
     for where, part, key in layers:
         if getattr(part, key) not in (None, diameter):
@@ -430,6 +449,8 @@ def _faults_of_section(rod: Rod) -> Iterator[Fault]:
             yield ("layers", index, "swelling"), layer.swelling, demand
 
 
+VARYING = ("thickness", "width", "stiffness", "natural_curvature", "natural_curvature_across", "natural_twist")
+"""Keys of a layer that may be profiles."""
 LEAST_CLOSED = 5
 """Stations of a closed rod: four edges."""
 
@@ -443,8 +464,7 @@ def _faults_of_closed(rod: Rod) -> Iterator[Fault]:
             if getattr(holder, end, None) is not None:
                 yield (*where, end), getattr(holder, end), "must be left out: a closed path has no ends to hold"
     parts = [((), rod, ("width", "inner_radius"))]
-    names = ("thickness", "stiffness", "natural_curvature", "natural_curvature_across", "natural_twist")
-    parts += [(("layers", index), layer, names) for index, layer in enumerate(rod.layers)]
+    parts += [(("layers", index), layer, VARYING) for index, layer in enumerate(rod.layers)]
     for where, part, keys in parts:
         for key in keys:
             first, last = values_at(getattr(part, key) or 0.0, np.array([0.0, rod.path.length]))
@@ -506,10 +526,10 @@ def _faults_of_copies(rod: Rod) -> Iterator[Fault]:
 
 def _bent_across(rod: Rod, index: int) -> Iterator[Fault]:
     """Yield a fault where the inner border of a layer would have no length by its natural curvature."""
-    bend = rod.layers[index].natural_curvature_across
+    bend, width = rod.layers[index].natural_curvature_across, extremes(rod.width_of(rod.layers[index]))[1]
     worst = max(map(abs, extremes(bend))) if bend is not None else 0.0
-    if 0.5 * worst * extremes(rod.width)[1] >= 1.0:
-        demand = f"must be below {2.0 / extremes(rod.width)[1]:g} 1/m: the inner border would have no length"
+    if 0.5 * worst * width >= 1.0:
+        demand = f"must be below {2.0 / width:g} 1/m: the inner border would have no length"
         yield ("layers", index, "natural_curvature_across"), worst, demand
 
 
@@ -524,7 +544,7 @@ def _sharp_bends(rod: Rod) -> Iterator[Fault]:
     share = 0.5 if len(rod.layers) == 1 else 1.0
     inner = [rod.layers[-1 if curvature > 0.0 else 0] for curvature in towards]
     distance = share * np.array([extremes(layer.thickness)[1] for layer in inner])
-    half_width = np.full(len(arc), 0.5 * extremes(rod.width)[1])
+    half_width = np.full(len(arc), 0.5 * rod.widest)
     faces = [f"the inner face of layer {layer.name}" for layer in inner]
     borders = ["its inner border"] * len(arc)
     for curvature, away, names in ((np.abs(towards), distance, faces), (np.abs(across), half_width, borders)):
