@@ -101,6 +101,7 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
         joint_rest=whole.joint_rest,
         node_radius=np.maximum(high, -low),
         retardation_time=scene.materials[rod.layers[0].material].retardation_time,
+        modulus=found.modulus(scene, rod, rod.layers[0]),
     )
     middle = _middle(rod, axis)
     path = -axis if abs(axis) > ON_CURVE * _thickness(rod).sum(axis=0).max() else 0.0

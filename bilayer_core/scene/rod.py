@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, fiel
 
 from bilayer_core.scene.close_paths import crossings
 from bilayer_core.scene.diffusion import Diffusion
-from bilayer_core.scene.eigenstrain import Eigenstrain
+from bilayer_core.scene.eigenstrain import Eigenstrain, Following, StiffnessChange
 from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, repeated
 from bilayer_core.scene.friction import Coefficients
 from bilayer_core.scene.imperfection import Imperfection
@@ -64,6 +64,8 @@ class Layer(Part):
     """One law or several, which add up."""
     stiffness: varying(PositiveNumber) = 1.0
     """Multiple of the material's elastic moduli."""
+    stiffness_change: StiffnessChange | None = None
+    """With a stimulus, as of a shape-memory alloy or a gel; none by default."""
     natural_curvature: varying(Curvature) | None = None
     """Of the layer by itself, through the thickness, positive where it bends to the normal; default: the path's."""
     natural_curvature_across: varying(Curvature) | None = None
@@ -84,7 +86,16 @@ class Layer(Part):
             law.model_copy(update={"stimulus": channels.get(law.stimulus, law.stimulus), "gain": gain * law.gain})
             for law in self.eigenstrain
         ]
-        return self.model_copy(update={"eigenstrain": laws})
+        change = self.stiffness_change
+        if change is not None:
+            change = change.model_copy(update={"stimulus": channels.get(change.stimulus, change.stimulus)})
+        return self.model_copy(update={"eigenstrain": laws, "stiffness_change": change})
+
+    @property
+    def laws(self) -> dict[Location, Following]:
+        """All that follows a stimulus, by its place in the layer."""
+        laws: dict[Location, Following] = {("eigenstrain", k): law for k, law in enumerate(self.eigenstrain)}
+        return laws if self.stiffness_change is None else laws | {("stiffness_change",): self.stiffness_change}
 
     @field_serializer("eigenstrain")
     def _as_written(self, laws: list[Eigenstrain]) -> Any:
@@ -222,11 +233,11 @@ class Rod(Part):
     def _variants(self) -> tuple[Rod, ...]:
         found: dict[Any, Rod] = {}
         for rod in {id(copy.rod): copy.rod for copy in self.copies}.values():
-            laws = tuple(tuple(layer.eigenstrain) for layer in rod.layers)
+            laws = tuple(tuple(layer.laws.values()) for layer in rod.layers)
             found.setdefault((rod.clamp_start, rod.clamp_end, laws), rod)
         return tuple(found.values())
 
-    def diffusion_of(self, layer: Layer, law: Eigenstrain) -> Diffusion | None:
+    def diffusion_of(self, layer: Layer, law: Following) -> Diffusion | None:
         """Return the field that a law of a layer follows; None if it follows its stimulus with a lag."""
         fields = (f for f in self.diffusion if f.stimulus == law.stimulus and layer.name in f.diffusivity)
         return next(fields, None)
@@ -428,14 +439,17 @@ def _faults_of_diffusion(rod: Rod) -> Iterator[Fault]:
             yield (*where, "interval"), field.interval, demand
         followed = False
         for slot, layer in enumerate(rod.layers):
-            for number, law in enumerate(layer.eigenstrain):
+            for place, law in layer.laws.items():
                 if rod.diffusion_of(layer, law) is not field:
                     continue
                 followed = True
+                if field.along and place == ("stiffness_change",):
+                    demand = "must be of a field that is alike all along the rod, and that of `diffusion` is not"
+                    yield ("layers", slot, *place, "stimulus"), law.stimulus, demand
                 for key in LAGS:
                     if getattr(law, key) is not None:
                         demand = "must be left out: the layer follows the rod's `diffusion`"
-                        yield ("layers", slot, "eigenstrain", number, key), getattr(law, key), demand
+                        yield ("layers", slot, *place, key), getattr(law, key), demand
         if not followed:
             demand = f"must be that of a law of a layer in `diffusivity` ({', '.join(field.diffusivity)})"
             yield (*where, "stimulus"), field.stimulus, demand
@@ -506,12 +520,11 @@ POINTS_COMPARED = 9
 
 def _faults_of_copies(rod: Rod) -> Iterator[Fault]:
     """Yield the faults of a pattern: laws that the rod lacks, clamps that it has itself, copies at one place."""
-    laws = [law for layer in rod.layers for law in layer.eigenstrain]
-    channels = dict.fromkeys(law.stimulus for law in laws)
+    channels = dict.fromkeys(law.stimulus for layer in rod.layers for law in layer.laws.values())
     for name in rod.pattern.stimuli:
         if name not in channels:
-            yield ("pattern", "stimuli", name), name, one_of("channels in the rod's eigenstrain laws", name, channels)
-    if rod.pattern.gains is not None and not laws:
+            yield ("pattern", "stimuli", name), name, one_of("channels in the rod's laws", name, channels)
+    if rod.pattern.gains is not None and not any(layer.eigenstrain for layer in rod.layers):
         yield ("pattern", "gains"), rod.pattern.gains, "must be left out: no layer has an eigenstrain"
     for end in ("clamp_start", "clamp_end"):
         if getattr(rod, end) is not None and getattr(rod.pattern, end) is not None:

@@ -36,7 +36,7 @@ def _natural(model: Model, state: State) -> tuple[Array, Array, Array]:
     drives, strips, rest = model.drives, model.flattening, model.drives.joint_rest[:, [0, 2]].copy()
     strain = free_strain(state.transduction, drives.law_gain, drives.law_reference, drives.law_saturation)
     np.add.at(rest[:, 0], drives.driven_joint, drives.driven_joint_weight * strain[drives.driven_joint_law])
-    return rest[strips.joint, 0], rest[strips.joint, 1], rest[strips.first :, 0]
+    return rest[strips.joint, 0], rest[strips.joint, 1], rest[strips.first :][: len(strips.joint), 0]
 
 
 def curvatures(model: Model, state: State) -> tuple[Array, Array]:
