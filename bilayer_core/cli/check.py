@@ -119,6 +119,9 @@ def _parts(scene) -> dict[str, list[str]]:
         if rod.pattern and (rod.pattern.stimuli or rod.pattern.gains):
             lines.append(_own_laws(rod.pattern))
         figures = edge_figures(scene, rod)
+        for layer, least, most in zip(rod.layers, *figures.multiple_range, strict=True):
+            if least < most:
+                lines.append(f"moduli of {layer.name} change to {least:.3g} to {most:.3g} times their own")
         strain, curvature = figures.eigenstrain.max(), figures.free_curvature().max()
         natural = abs(figures.natural_change()).max()
         if natural > 0.0:

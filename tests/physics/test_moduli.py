@@ -9,6 +9,7 @@ from support.sample_scenes import GEL, fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SceneError
+from bilayer_core.model.edge_figures import edge_figures
 
 SOFT = {"stimulus": "warmth", "gain": -0.8}
 GAIN, HALF = 0.01, 1e-3
@@ -168,6 +169,15 @@ def test_changes_of_moduli_that_no_layer_can_have_are_refused(change, told):
     with pytest.raises(SceneError) as refused:
         load_scene(content)
     assert told in str(refused.value)
+
+
+def test_figures_take_the_moduli_at_which_a_strip_bends_most():
+    content = bilayer()
+    content["rods"][0]["layers"][0] |= {"stiffness": 0.5}
+    config = load_scene(content)
+    figures = edge_figures(config, config.rods[0])
+    assert figures.multiple_range == pytest.approx(np.array([[1.0, 0.2], [1.0, 1.0]]))
+    assert figures.free_curvature().max() == pytest.approx(1.5 * GAIN / (2.0 * HALF), rel=1e-12)  # at 0.5 of both
 
 
 def test_a_laminate_refuses_an_axis_that_moves_and_a_strip_moduli_that_change():
