@@ -33,16 +33,17 @@ PUBLIC = {("beam", "Kirchhoff's", 12): 0.36281, ("strip", "Sano's", 12): 0.35281
 """Shear over length at the pitchfork, from equilibria of the public program's energies, by section and L over w."""
 
 
-def _simulator(width: float, section: str) -> Simulator:
-    ribbon = rod([layer()], FREE, EDGES + 1, width=width, section=section, clamp_start="still", clamp_end="moved")
+def _simulator(width: float, section: str, edges: int, between: float) -> Simulator:
+    ends = {"clamp_start": "still", "clamp_end": "moved"}
+    ribbon = rod([layer()], between, edges + 1, width=width, section=section, **ends)
     gel = {"youngs_modulus": 1e10, "poisson_ratio": 0.5, "density": 1000.0}
-    bodies = [fixed("still"), fixed("moved", (FREE, 0, 0))]
+    bodies = [fixed("still"), fixed("moved", (between, 0, 0))]
     return Simulator(load_scene(scene([ribbon], bodies=bodies, materials={"gel": gel})), model="laminate", dimension=3)
 
 
 def _move(simulator: Simulator, along: float, aside: float) -> bool:
     """Move the clamp [m], and go to the equilibrium near the shape moved along; whether that is stable."""
-    part = np.linspace(0.0, 1.0, EDGES + 1)
+    part = np.linspace(0.0, 1.0, len(simulator.positions))
     way = np.stack([along * part, aside * (3.0 - 2.0 * part) * part**2, 0.0 * part], axis=1)
     place = simulator.frame().body_positions + [[0.0, 0.0, 0.0], [along, aside, 0.0]]
     put(simulator, position=simulator.positions + way, body_position=place)
@@ -50,14 +51,17 @@ def _move(simulator: Simulator, along: float, aside: float) -> bool:
 
 
 def _height(simulator: Simulator) -> float:
-    return abs(float(simulator.positions[[EDGES // 2, EDGES // 2 + 1], 2].mean()))
+    last = len(simulator.positions) - 1
+    return abs(float(simulator.positions[[last // 2, last - last // 2], 2].mean()))
 
 
-def pitchfork(width: float, section: str) -> float:
-    """Return the shear over the length at which the middle of a ribbon leaves the height of the clamps."""
-    ribbon = _simulator(width, "beam")
+def pitchfork(width: float, section: str, edges: int = EDGES, between: float = FREE) -> float:
+    """Return the shear over the length at which the middle of a ribbon leaves the height of the clamps; these are so
+    far apart [m] at first.
+    """
+    ribbon = _simulator(width, "beam", edges, between)
     arch = ribbon.positions.copy()
-    arch[:, 2] = -1e-3 * np.sin(np.pi * arch[:, 0] / FREE) ** 2
+    arch[:, 2] = -1e-3 * np.sin(np.pi * arch[:, 0] / between) ** 2
     put(ribbon, position=arch)
     for _ in range(10):
         _move(ribbon, -PRESSED / 10, 0.0)
@@ -67,7 +71,7 @@ def pitchfork(width: float, section: str) -> float:
         parts = {
             name: getattr(ribbon._state, name).copy() for name in ("position", "director1", "twist", "body_position")
         }
-        ribbon = _simulator(width, section)
+        ribbon = _simulator(width, section, edges, between)
         put(ribbon, **parts)
         ribbon.solve_static()
     shear, step, level = SHEARED, FIRST_STEP, ribbon.save_state()
