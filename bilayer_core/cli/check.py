@@ -96,7 +96,8 @@ def _parts(scene) -> dict[str, list[str]]:
     parts = {}
     for rod in scene.rods:
         copies = f"{rod.pattern.copies} of them, each " if rod.pattern else ""
-        wide = f"{_millimetres(extremes(rod.width))} wide"
+        widths = dict.fromkeys(_millimetres(extremes(rod.width_of(layer))) for layer in rod.layers)
+        wide = f"{' and '.join(widths)} wide"
         if rod.radius is not None:
             hole = f", hole {_millimetres(extremes(rod.inner_radius))}" if rod.inner_radius != 0.0 else ""
             wide = f"round, radius {_millimetres(extremes(rod.radius))}{hole}"
@@ -118,6 +119,9 @@ def _parts(scene) -> dict[str, list[str]]:
         if rod.pattern and (rod.pattern.stimuli or rod.pattern.gains):
             lines.append(_own_laws(rod.pattern))
         figures = edge_figures(scene, rod)
+        for layer, least, most in zip(rod.layers, *figures.multiple_range, strict=True):
+            if least < most:
+                lines.append(f"moduli of {layer.name} change to {least:.3g} to {most:.3g} times their own")
         strain, curvature = figures.eigenstrain.max(), figures.free_curvature().max()
         natural = abs(figures.natural_change()).max()
         if natural > 0.0:

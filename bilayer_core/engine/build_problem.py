@@ -38,7 +38,7 @@ def lasting_groups(model: Model, sizes: dict[str, int]) -> dict[str, Any]:
         **{name: getattr(model, name) for name in AS_BUILT},
         **{
             name: getattr(model, name).allocated(sizes)
-            for name in ("off_axis", "flattening", "flow", "fluid", "varied_fields")
+            for name in ("off_axis", "flattening", "moduli", "flow", "fluid", "varied_fields")
         },
         raised=model.raised.allocated(sizes, first=sizes["strain"] - 3 * model.kept_directors),
         light=light_of(model),

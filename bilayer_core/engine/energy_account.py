@@ -39,7 +39,7 @@ The account is part of the state, so that a run that is continued makes the same
 from __future__ import annotations
 
 from bilayer_core.engine.kinetic import kinetic_energy
-from bilayer_core.engine.laws import write_strains_of_laws
+from bilayer_core.engine.laws import grow, write_strains_of_laws
 from bilayer_core.engine.powers import BY_FLOW, in_barriers, write_forces_of_laws
 from bilayer_core.forces.added_mass import fluid_momentum, move_fluid
 from bilayer_core.forces.flattening import pull_of_change, pull_of_rest
@@ -169,6 +169,10 @@ def _supply_by_jumps(p, state, inputs, work):
     write_strains_of_laws(drives, work.transduction, work.strain)
     for i in range(work.start_strain.shape[0]):
         work.strain[i] -= work.start_strain[i]
+    done.jumped = True
+    if p.moduli.exists:
+        _supply_with_moduli(p, work)
+        return
     if p.flattening.exists:
         pull_of_rest(p, configuration_at(work.configurations[0]), stage)
     stage.rest_edge[:], stage.rest_joint[:] = 0.0, 0.0  # scratch until a stage begins
@@ -191,7 +195,23 @@ def _supply_by_jumps(p, state, inputs, work):
     for i in range(work.start_strain.shape[0]):
         done.supplied -= 0.5 * (state.law_force[i] + work.start_force[i]) * work.strain[i]
         work.start_strain[i] += work.strain[i]
-    done.jumped = True
+
+
+@kernel
+def _supply_with_moduli(p, work):
+    """Supply the same where moduli follow stimuli: V is a polynomial of degree 3 along the way, Simpson's rule exact
+    but for tilts of bonds.
+    """
+    at, supplied = configuration_at(work.configurations[0]), 0.0
+    for k in range(3):
+        if k > 0:
+            for i in range(work.start_strain.shape[0]):
+                work.start_strain[i] += 0.5 * work.strain[i]
+            grow(p.drives, work.start_strain, work.stage.rest_edge, work.stage.rest_joint)
+            write_forces_of_laws(p, at, work.stage, work.start_force)
+        for i in range(work.start_strain.shape[0]):
+            supplied += (4.0 if k == 1 else 1.0) / 6.0 * work.start_force[i] * work.strain[i]
+    work.account.supplied -= supplied
 
 
 @kernel

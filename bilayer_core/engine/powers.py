@@ -5,7 +5,9 @@ from __future__ import annotations
 from bilayer_core.contact.barrier import barrier_gradient
 from bilayer_core.contact.gap import gap_normal, place_of
 from bilayer_core.forces.bend_twist import bend_by_strains
+from bilayer_core.forces.elements import multiple_of_edge, multiple_of_joint
 from bilayer_core.forces.flattening import pull_of_rest
+from bilayer_core.forces.moduli import pull_of_moduli
 from bilayer_core.forces.rail_arms import write_rail_motions
 from bilayer_core.forces.rod_arms import add_step_of_arm, write_material_rate
 from bilayer_core.forces.rod_contact import moved_between
@@ -31,14 +33,20 @@ def write_forces_of_laws(p, at, stage, force_out):
     for k in range(drives.driven_edge.shape[0]):
         e, weight = drives.driven_edge[k], drives.driven_weight[k]
         strain = at.length[e] / strands.rest_length[e] - 1.0 - stage.rest_edge[e]
-        force_out[drives.driven_law[k]] += weight * strands.axial_stiffness[e] * strain * strands.rest_length[e]
+        stiffness = multiple_of_edge(p, stage, e) * strands.axial_stiffness[e]
+        force_out[drives.driven_law[k]] += weight * stiffness * strain * strands.rest_length[e]
     bends = drives.driven_joint.shape[0] > 0 and off_axis.exists
     if bends:
         bend_by_strains(off_axis, strands, at, stage.rest_joint)
     if p.flattening.exists:
         pull_of_rest(p, at, stage)
+    if p.moduli.exists:
+        pull_of_moduli(p, at, stage)
     for k in range(drives.driven_joint.shape[0]):
         j, column = drives.driven_joint[k], drives.driven_joint_column[k]
+        if p.moduli.exists and j >= p.moduli.first:
+            force_out[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * p.moduli.pull[j]
+            continue
         if p.flattening.exists and p.flattening.row[j]:
             force_out[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * p.flattening.pull[j, column]
             continue
@@ -46,7 +54,8 @@ def write_forces_of_laws(p, at, stage, force_out):
         t, u = row(at.tangent, a), row(at.tangent, b)
         bend = (dot(u, row(at.director1, a)) - dot(t, row(at.director1, b))) / (1.0 + dot(t, u))
         bend -= off_axis.rest[j, 0] if bends else stage.rest_joint[j, 0]
-        moment = drives.driven_joint_weight[k] * strands.joint_stiffness[j, 0] * bend
+        stiffness = multiple_of_joint(p, stage, j, 0) * strands.joint_stiffness[j, 0]
+        moment = drives.driven_joint_weight[k] * stiffness * bend
         force_out[drives.driven_joint_law[k]] += moment
     return READY
 

@@ -7,7 +7,7 @@ import math
 from bilayer_core.contact.crossing import crossing, note_start
 from bilayer_core.engine.configuration import take_state
 from bilayer_core.engine.energy_account import begin_step_account, close_step_account
-from bilayer_core.engine.laws import lagged, write_strains_of_laws
+from bilayer_core.engine.laws import grow, lagged, write_strains_of_laws
 from bilayer_core.engine.light_over_step import begin_light, end_light, see_light
 from bilayer_core.engine.newton import first_guess_of, minimise_potential
 from bilayer_core.engine.potential import end_forces, start_stage
@@ -61,18 +61,6 @@ with it the faces of its rod.
 
 
 @kernel
-def _grow(drives, law_strain, rest_edge_out, rest_joint_out):
-    """Write the rest strains of edges and joints from the eigenstrain of laws."""
-    copy(drives.rest_strain, rest_edge_out)
-    for k in range(drives.driven_edge.shape[0]):
-        rest_edge_out[drives.driven_edge[k]] += drives.driven_weight[k] * law_strain[drives.driven_law[k]]
-    copy(drives.joint_rest, rest_joint_out)
-    for k in range(drives.driven_joint.shape[0]):
-        bent = drives.driven_joint_weight[k] * law_strain[drives.driven_joint_law[k]]
-        rest_joint_out[drives.driven_joint[k], drives.driven_joint_column[k]] += bent
-
-
-@kernel
 def _compare_touched(sums, touched):
     """Note which contact points something pushes; whether they are those of before."""
     same = True
@@ -103,7 +91,7 @@ def drive_stage(p, state, inputs, n, work):
             lags = drives.mode_rising[m], drives.mode_falling[m]
             transduction[m] = lagged(state.transduction[m], first, last, lags[0], lags[1], inputs.elapsed[n])
     write_strains_of_laws(drives, transduction, strain)
-    _grow(drives, strain, stage.rest_edge, stage.rest_joint)
+    grow(drives, strain, stage.rest_edge, stage.rest_joint)
     for i in range(stage.load_factor.shape[0]):
         stage.load_factor[i] = inputs.load_factor[n, i]
     return READY
@@ -113,7 +101,7 @@ def drive_stage(p, state, inputs, n, work):
 def write_rest_strains(p, state, work):
     """Write the eigenstrain of laws and the rest strains of a state to `work`, from what its materials have reached."""
     write_strains_of_laws(p.drives, state.transduction, work.strain)
-    _grow(p.drives, work.strain, work.stage.rest_edge, work.stage.rest_joint)
+    grow(p.drives, work.strain, work.stage.rest_edge, work.stage.rest_joint)
     return READY
 
 

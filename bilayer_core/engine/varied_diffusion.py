@@ -9,9 +9,10 @@ The integral is a sum over Gauss points. A step with K held at its start,
 
     (1 + h K(a₀)) q₁ = q₀ − h γ u′,
 
-damps fast modes whatever h. Its error is a series in h, so steps of h, h/2 and h/3 are extrapolated to third order
-(Aitken and Neville); the last two values tell the error, by which h is chosen. The same values give the same steps, so
-runs that are continued or replayed stay the same bit for bit. States keep y, as for any field.
+damps fast modes whatever h. Its error is a series in h, so steps of h and h/2 are extrapolated (Aitken and Neville), to
+third order with h/3 where that is not enough; the last two values tell the error, by which h is chosen. Steps of a
+mechanism are short beside diffusion, so that two are mostly enough. The same values give the same steps, so runs that
+are continued or replayed stay the same bit for bit. States keep y, as for any field.
 """
 
 from __future__ import annotations
@@ -43,23 +44,34 @@ def _diffusivity(varied, g, a):
 
 
 @kernel
-def _step(varied, own, size, u, push, h, amplitude, q):
-    """Make a step of length h [s] from the stimulus u, which changes by `push` a second, in place."""
-    matrix, entry, square = varied.matrix, varied.entry[own], varied.square[own]
+def _hold(varied, own, size, u, q):
+    """Write K(a) to the upper triangle of `matrix`, its diagonal to the last row of `level`, which is made last."""
+    matrix, diagonal, entry, square = varied.matrix, varied.level[LEVELS - 1], varied.entry[own], varied.square[own]
     for i in range(size):
-        for j in range(i + 1):
-            matrix[i, j] = h * varied.exchange[square + i * size + j]
-        matrix[i, i] += 1.0
+        diagonal[i] = varied.exchange[square + i * size + i]
+        for j in range(i + 1, size):
+            matrix[i, j] = varied.exchange[square + i * size + j]
     for g in range(varied.point[own], varied.point[own + 1]):
         at = entry + (g - varied.point[own]) * size
         a = u
         for i in range(size):
             a += varied.value[at + i] * q[i]
-        stiff = h * varied.weight[g] * _diffusivity(varied, g, a)
+        stiff = varied.weight[g] * _diffusivity(varied, g, a)
         for i in range(size):
             part = stiff * varied.slope[at + i]
-            for j in range(i + 1):
+            diagonal[i] += part * varied.slope[at + i]
+            for j in range(i + 1, size):
                 matrix[i, j] += part * varied.slope[at + j]
+
+
+@kernel
+def _step(varied, size, push, h, amplitude, q):
+    """Make a step of length h [s] with K as it is held, while the stimulus changes by `push` a second, in place."""
+    matrix, diagonal = varied.matrix, varied.level[LEVELS - 1]
+    for i in range(size):
+        for j in range(i):
+            matrix[i, j] = h * matrix[j, i]
+        matrix[i, i] = 1.0 + h * diagonal[i]
     for i in range(size):
         q[i] -= h * push * varied.amplitude[amplitude + i]
     for j in range(size):  # Cholesky, and both triangles
@@ -83,27 +95,33 @@ def _step(varied, own, size, u, push, h, amplitude, q):
 
 @kernel
 def _extrapolate(varied, own, size, u, push, h, amplitude):
-    """Write q after a step of length h [s] to `moved`; its error, the root mean square over the thickness."""
+    """Write q after a step of length h [s] to `moved`; its error, the root mean square over the thickness, in parts of
+    what is allowed, and its order.
+    """
     level, q = varied.level, varied.moved
-    square = whole = 0.0
+    whole = 0.0
+    for i in range(size):
+        whole += varied.amplitude[amplitude + i] ** 2
     for n in range(LEVELS):
         copy(varied.present, q)
-        part = h / (n + 1)
+        part, square = h / (n + 1), 0.0
         for k in range(n + 1):
-            _step(varied, own, size, u + push * (k * part), push, part, amplitude, q)
+            if k > 0 or n != 1:  # two parts begin where one does
+                _hold(varied, own, size, u + push * (k * part), q)
+            _step(varied, size, push, part, amplitude, q)
         for i in range(size):
             better = q[i]  # level[k, i] is that of n parts, extrapolated k times
             for k in range(n):
                 before = level[k, i]
                 level[k, i] = better
                 better += (better - before) / ((n + 1) / (n - k) - 1.0)
-            level[n, i] = better
-            if n == LEVELS - 1:
+            level[n, i] = q[i] = better
+            if n > 0:
                 square += (better - level[n - 1, i]) ** 2
-                whole += varied.amplitude[amplitude + i] ** 2
-    for i in range(size):
-        q[i] = level[LEVELS - 1, i]
-    return math.sqrt(square / whole)
+        error = math.sqrt(square / whole) / varied.tolerance[own]
+        if n == LEVELS - 1 or (n > 0 and error <= 1.0):
+            return error, n + 1
+    return math.inf, LEVELS
 
 
 @kernel
@@ -129,8 +147,8 @@ def diffuse(varied, drives, f, reached, first, last, dt, reached_out):
         varied.present[i] = varied.amplitude[begin + i] * (reached[begin + i] - first)
     while time < dt:
         h = min(h, dt - time)
-        error = _extrapolate(varied, own, size, first + push * time, push, h, begin) / varied.tolerance[own]
-        factor = LARGEST_FACTOR if error == 0.0 else SAFETY * error ** (-1.0 / LEVELS)
+        error, order = _extrapolate(varied, own, size, first + push * time, push, h, begin)
+        factor = LARGEST_FACTOR if error == 0.0 else SAFETY * error ** (-1.0 / order)
         if error <= 1.0 or h <= SHORTEST * dt:
             time = dt if h == dt - time else time + h
             copy(varied.moved, varied.present)

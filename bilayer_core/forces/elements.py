@@ -44,11 +44,24 @@ def strains_of_pair(strands, bonds, at, k):
 
 
 @kernel
+def strains_of_joint(strands, at, k):
+    """Return κ₁, κ₂ and ψ of a joint. Whole turns of ψ are those of `Configuration.joint_strain`."""
+    i, j = strands.joint_a[k], strands.joint_b[k]
+    a, b = row(at.tangent, i), row(at.tangent, j)
+    m1a, m2a, m1b = row(at.director1, i), row(at.director2, i), row(at.director1, j)
+    ic = 1.0 / (1.0 + dot(a, b))
+    p1, p2, q1 = dot(b, m1a), dot(b, m2a), dot(a, m1b)
+    psi = angle(dot(m1a, m1b) - p1 * q1 * ic, dot(m2a, m1b) - p2 * q1 * ic)
+    psi += TWO_PI * math.floor((at.joint_strain[k, 2] - psi) / TWO_PI + 0.5)
+    return (p1 - q1) * ic, (p2 - dot(a, row(at.director2, j))) * ic, psi
+
+
+@kernel
 def measure_strains(p, at, strain_out):
     """Write the strains of all elements: ε of edges, κ₁ − Σ b ε, κ₂ and ψ of joints, and p·m̄_α between layers; nothing
     without viscosity.
 
-    Shape (n_edge + 3 n_joint + 3 n_pair,) or (0,). Whole turns of ψ are those of `Configuration.joint_strain`.
+    Shape (n_edge + 3 n_joint + 3 n_pair,) or (0,).
     """
     if not p.viscosity.exists:
         return
@@ -56,15 +69,9 @@ def measure_strains(p, at, strain_out):
     for e in range(edges):
         strain_out[e] = at.length[e] / strands.rest_length[e] - 1.0
     for k in range(strands.joint_a.shape[0]):
-        i, j = strands.joint_a[k], strands.joint_b[k]
-        a, b = row(at.tangent, i), row(at.tangent, j)
-        m1a, m2a, m1b = row(at.director1, i), row(at.director2, i), row(at.director1, j)
-        ic = 1.0 / (1.0 + dot(a, b))
-        p1, p2, q1 = dot(b, m1a), dot(b, m2a), dot(a, m1b)
-        psi = angle(dot(m1a, m1b) - p1 * q1 * ic, dot(m2a, m1b) - p2 * q1 * ic)
-        psi += TWO_PI * math.floor((at.joint_strain[k, 2] - psi) / TWO_PI + 0.5)
-        strain_out[edges + 3 * k] = (p1 - q1) * ic
-        strain_out[edges + 3 * k + 1] = (p2 - dot(a, row(at.director2, j))) * ic
+        kappa1, kappa2, psi = strains_of_joint(strands, at, k)
+        strain_out[edges + 3 * k] = kappa1
+        strain_out[edges + 3 * k + 1] = kappa2
         strain_out[edges + 3 * k + 2] = psi
     begin = edges + 3 * strands.joint_a.shape[0]
     for k in range(p.bonds.joint.shape[0]):
@@ -88,6 +95,32 @@ def slot_of_pair(strands, k, c):
 
 
 @kernel
+def multiple_of_edge(p, stage, e):
+    """Return the multiple of the stiffness of an edge; see `forces.moduli`."""
+    return stage.rest_joint[p.moduli.edge[e], 0] if p.moduli.exists else 1.0
+
+
+@kernel
+def multiple_of_joint(p, stage, k, c):
+    """Return that of component c of a joint."""
+    if not p.moduli.exists:
+        return 1.0
+    if k < p.strands.bend_count:
+        return stage.rest_joint[p.moduli.joint[k], 0]
+    if c != 1:
+        return 1.0
+    first = multiple_of_edge(p, stage, p.strands.joint_a[k])
+    second, share = multiple_of_edge(p, stage, p.strands.joint_b[k]), p.moduli.share[k]
+    return first * second / (share * first + (1.0 - share) * second)
+
+
+@kernel
+def multiple_of_pair(p, stage, k):
+    """Return that of a vector between layers."""
+    return stage.rest_joint[p.moduli.pair[k], 0] if p.moduli.exists else 1.0
+
+
+@kernel
 def act_together(elastic, beta, rest, origin):
     """Return 1 + β for elasticity, if selected, and viscosity, and the strain from which they act together."""
     weight = beta + elastic
@@ -101,8 +134,9 @@ def start_elements(_, p, start, stage):
     """Write the stiffness of elements over a stage and their rest strains, of those forces that are selected."""
     strands, viscosity, selected, edges = p.strands, p.viscosity, p.sums.selected, p.strands.edge_count
     viscous, length = acts_viscously(p), stage.length
-    elastic, beta, origin = 1.0 * selected[STRETCHING], 0.0, 0.0
+    beta = origin = 0.0
     for e in range(edges):
+        elastic = multiple_of_edge(p, stage, e) * selected[STRETCHING]
         if viscous:
             beta, origin = viscosity.edge_time[e] / length, stage.origin_strain[e]
         weight, rest = act_together(elastic, beta, stage.rest_edge[e], origin)
@@ -111,6 +145,7 @@ def start_elements(_, p, start, stage):
     for k in range(strands.joint_a.shape[0]):
         for c in range(3):
             elastic = ties if k >= strands.bend_count else twists if c == 2 else bends
+            elastic *= multiple_of_joint(p, stage, k, c)
             if viscous:
                 beta, origin = viscosity.joint_time[k, c] / length, stage.origin_strain[edges + 3 * k + c]
             weight, rest = act_together(elastic, beta, stage.rest_joint[k, c], origin)
@@ -120,7 +155,7 @@ def start_elements(_, p, start, stage):
         for c in range(3):
             if viscous:
                 beta, origin = viscosity.pair_time[k, c] / length, stage.origin_strain[begin + 3 * k + c]
-            elastic = 1.0 * selected[slot_of_pair(strands, k, c)]
+            elastic = multiple_of_pair(p, stage, k) * selected[slot_of_pair(strands, k, c)]
             weight, rest = act_together(elastic, beta, bonds.rest[k, c], origin)
             stage.pair_stiffness[k, c], stage.neutral_pair[k, c] = weight * bonds.stiffness[k, c], rest
     return READY

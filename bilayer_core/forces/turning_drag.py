@@ -21,7 +21,7 @@ import numpy as np
 
 from bilayer_core.jit import piece, record
 from bilayer_core.jit.record import Vector
-from bilayer_core.model.bend_faces import section_thickness
+from bilayer_core.model.bend_faces import whole_section
 from bilayer_core.model.force_slots import slot_of
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.problem import Problem
@@ -60,10 +60,10 @@ def turning_flow_of(model: Model) -> TurningFlow:
     fluid = model.scene.fluid
     if fluid is None or fluid.drag_turning == 0.0:
         return TurningFlow.absent()
-    whole, coefficient = section_thickness(model), np.zeros(model.rods.edge_count)
+    (widest, whole), coefficient = whole_section(model), np.zeros(model.rods.edge_count)
     for strand in model.strands:
         nodes = slice(strand.first_node, strand.first_node + strand.node_count)
-        share, width = strand.thickness / whole[nodes], strand.width
+        share, width = strand.thickness / whole[nodes], widest[nodes]
         if strand.round:
             continue  # a round rod turns about its axis without pushing the fluid
         at_edges = [0.5 * (of[1:] + of[:-1]) for of in (share, width)]

@@ -34,6 +34,9 @@ from bilayer_core.forces.elements import (
     VISCOSITY,
     act_together,
     acts_viscously,
+    multiple_of_edge,
+    multiple_of_joint,
+    multiple_of_pair,
     slot_of_pair,
     strains_of_pair,
 )
@@ -58,12 +61,12 @@ def add_viscosity(_, p, at, stage, with_hessian):
     selected, length = sums.selected, stage.length
     if not acts_viscously(p):
         return math.inf
-    lost, elastic = 0.0, 1.0 * selected[STRETCHING]
+    lost = 0.0
     for e in range(edges):
         beta, strain = viscosity.edge_time[e] / length, at.length[e] / strands.rest_length[e] - 1.0
         of_elasticity, of_viscosity = _energies(
             strands.axial_stiffness[e] * strands.rest_length[e],
-            elastic,
+            multiple_of_edge(p, stage, e) * selected[STRETCHING],
             beta,
             strain,
             stage.rest_edge[e],
@@ -80,7 +83,7 @@ def add_viscosity(_, p, at, stage, with_hessian):
                 strain -= p.off_axis.rest[k, 0] - stage.neutral_joint[k, 0]
             of_elasticity, of_viscosity = _energies(
                 strands.joint_stiffness[k, c],
-                ties if tied else twists if c == 2 else bends,
+                multiple_of_joint(p, stage, k, c) * (ties if tied else twists if c == 2 else bends),
                 viscosity.joint_time[k, c] / length,
                 strain,
                 stage.rest_joint[k, c],
@@ -95,7 +98,7 @@ def add_viscosity(_, p, at, stage, with_hessian):
             slot = slot_of_pair(strands, k, c)
             of_elasticity, of_viscosity = _energies(
                 bonds.stiffness[k, c],
-                1.0 * selected[slot],
+                multiple_of_pair(p, stage, k) * selected[slot],
                 viscosity.pair_time[k, c] / length,
                 strains[c],
                 bonds.rest[k, c],

@@ -27,12 +27,12 @@ def bend_faces(model: Model) -> tuple[Array, Array]:
         own = slice(strand.first_node, strand.first_node + strand.node_count)
         faces[own] = np.stack([strand.offset - half, strand.offset + half], axis=1)
     node = model.joint_node[: model.rods.bend_count]
-    return faces[node], section_thickness(model)[node]
+    return faces[node], whole_section(model)[1][node]
 
 
-def section_thickness(model: Model) -> Array:
-    """Return the thickness of all layers of its rod at each node [m], shape (n_node,)."""
-    whole, of_rods = np.zeros(model.node_count), defaultdict(list)
+def whole_section(model: Model) -> tuple[Array, Array]:
+    """Return the width of the widest layer of its rod, and the thickness of all, at each node [m], shape (n_node,)."""
+    (width, thickness), of_rods = np.zeros((2, model.node_count)), defaultdict(list)
     for strand in model.strands:
         of_rods[strand.rod].append(strand)
     for strands in of_rods.values():
@@ -41,5 +41,7 @@ def section_thickness(model: Model) -> Array:
             for other in strands:
                 place = station - other.first_station
                 there = np.flatnonzero((place >= 0) & (place < other.node_count))
-                whole[strand.first_node + there] += other.thickness[place[there]]
-    return whole
+                at, place = strand.first_node + there, place[there]
+                thickness[at] += other.thickness[place]
+                width[at] = np.maximum(width[at], other.width[place])
+    return width, thickness

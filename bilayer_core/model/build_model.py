@@ -29,6 +29,7 @@ from bilayer_core.model.records.parts import (
     Drives,
     Flattening,
     Joins,
+    Moduli,
     OffAxis,
     Plane,
     Strands,
@@ -88,6 +89,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         light=build_light(scene, found, placed, rods, drives),
         plane=Plane.absent() if plane is None else _plane(plane, found, placed, rods),
         flattening=_flattening(found, rods),
+        moduli=_moduli(found, rods, drives),
         off_axis=OffAxis.absent() if bonds.exists else _off_axis(found, rods, strain_coupling),
         bonds=bonds,
         raised=raised,
@@ -170,16 +172,19 @@ def _drives(found: Collected) -> Drives:
     rest, strips = _of_joints(found, "joint_rest", width=3), found.column("strip_joint", np.int64)
     curled = len(rest) + np.searchsorted(strips, found.column("curled_joint", np.int64))
     driven, twisted = (found.column(f"{name}_joint", np.int64) for name in ("driven", "twisted"))
+    multiples = np.zeros((len(found.moduli) + 1 if found.moduli else 0, 3))
+    multiples[:, 0] = 1.0
+    changed = len(rest) + len(strips) + np.arange(len(found.moduli))
     return Drives(
         rest_strain=found.column("rest_strain"),
-        joint_rest=np.concatenate([rest, np.zeros((len(strips), 3))]),
+        joint_rest=np.concatenate([rest, np.zeros((len(strips), 3)), multiples]),
         driven_edge=found.column("driven_edge", np.int64),
         driven_law=found.column("driven_law", np.int64),
         driven_weight=found.column("driven_weight"),
-        driven_joint=np.concatenate([driven, curled, twisted]),
-        driven_joint_column=np.repeat([0, 0, 2], [len(driven), len(curled), len(twisted)]),
-        driven_joint_law=_of_driven(found, "law", np.int64),
-        driven_joint_weight=_of_driven(found, "weight"),
+        driven_joint=np.concatenate([driven, curled, twisted, changed]),
+        driven_joint_column=np.repeat([0, 0, 2, 0], [len(driven), len(curled), len(twisted), len(changed)]),
+        driven_joint_law=np.concatenate([_of_driven(found, "law", np.int64), np.array(found.moduli, dtype=np.int64)]),
+        driven_joint_weight=np.append(_of_driven(found, "weight"), np.ones(len(found.moduli))),
         field_channel=np.array([channel for channel, *_ in found.fields], dtype=np.int64),
         field_first=first.astype(np.int64),
         field_slowest=first[:-1] + np.array([of.max(axis=1).argmax() for of in lags], dtype=np.int64),
@@ -220,6 +225,28 @@ def _flattening(found: Collected, rods: Strands) -> Flattening:
         start=found.column("strip_start") ** 2,
         series=flattening_series(offset),
         **{name: found.column(f"strip_{name}") for name in ("curl", "skew", "offset")},
+    )
+
+
+def _moduli(found: Collected, rods: Strands, drives: Drives) -> Moduli:
+    """Return the rows with the multiples of elastic moduli; absent where none follow a stimulus."""
+    if not found.moduli:
+        return Moduli.absent()
+    last = len(drives.joint_rest) - 1
+    first = last - len(found.moduli)
+
+    def rows(own: np.ndarray) -> np.ndarray:
+        return np.where(own < 0, last, first + own)
+
+    bonded = found.column("bond_share")
+    of_joints = np.append(found.column("joint_modulus", np.int64), np.full(len(bonded), -1))
+    return Moduli.zeros(
+        UNALLOCATED,
+        first=first,
+        edge=rows(found.column("edge_modulus", np.int64)),
+        joint=rows(of_joints),
+        pair=rows(_of_pairs(found, "modulus", np.int64)),
+        share=np.append(np.zeros(rods.bend_count), bonded),
     )
 
 

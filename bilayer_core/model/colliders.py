@@ -11,7 +11,6 @@ from bilayer_core.model.section import outline
 from bilayer_core.model.validity import bend_of
 from bilayer_core.scene.body import Body, Prescribed
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.scene.profile import values_at
 from bilayer_core.scene.rod import Rod
 
 ROUND = 2.0
@@ -136,8 +135,8 @@ def meets_with_borders(rod: Rod) -> bool:
 
 def _is_ribbon(rod: Rod, times: float) -> bool:
     stations = np.arange(rod.stations)
-    _, thickness = outline(rod, stations)
-    return bool(np.any(values_at(rod.width, rod.edge_length * stations) > times * thickness.sum(axis=0) * (1.0 + 1e-9)))
+    width, thickness = outline(rod, stations)
+    return bool(np.any(width > times * thickness.sum(axis=0) * (1.0 + 1e-9)))
 
 
 def _points_of_rods(scene: SceneConfig, dimension: int, kind: str) -> str:

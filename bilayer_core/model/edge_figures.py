@@ -26,6 +26,17 @@ def _eigenstrain_range(scene: SceneConfig, rod: Rod, layer: Layer, laws: tuple[E
     return found
 
 
+def _multiples(scene: SceneConfig, rod: Rod, index: int) -> tuple[float, float]:
+    """Return the least and the largest multiple of the moduli of a layer over its channel's range."""
+    found = [1.0] if rod.layers[index].stiffness_change is None else []
+    for variant in rod.variants:
+        layer = variant.layers[index]
+        if (law := layer.stiffness_change) is not None:
+            channel = scene.stimuli[law.stimulus]
+            found += (1.0 + strain_at(variant, layer, law, np.array([channel.minimum, channel.maximum]))).tolist()
+    return min(found), max(found)
+
+
 def edge_figures(scene: SceneConfig, rod: Rod) -> EdgeFigures:
     """Return the figures of a rod of a scene."""
     return scene.keep("edge figures", (rod,), lambda: EdgeFigures(scene, rod))
@@ -44,6 +55,8 @@ class EdgeFigures:
         Likewise across the path.
     eigenstrain_range : ndarray
         Least and largest, likewise, shape (2, n_layer, n_edge).
+    multiple_range : ndarray
+        Least and largest multiple of each layer's moduli over its channel's range, shape (2, n_layer).
     poisson_ratio : float
         Of its layers, mean by thickness.
     """
@@ -57,8 +70,10 @@ class EdgeFigures:
         self._moduli, self._shear_moduli = np.zeros_like(self._layers), np.zeros_like(self._layers)
         self.eigenstrain, self.eigenstrain_across = np.zeros_like(self._layers), np.zeros_like(self._layers)
         self.eigenstrain_range = np.zeros((2, *self._layers.shape))
+        self.multiple_range = np.array([_multiples(scene, rod, index) for index in range(len(rod.layers))]).T
         for index, layer in enumerate(rod.layers):
-            stiffness = values_at(layer.stiffness, rod.edge_length * stations)
+            along = rod.edge_length * stations
+            stiffness = values_at(layer.stiffness, along) * values_at(rod.width_of(layer), along) / self.width
             material = scene.materials[layer.material]
             self._moduli[index] = stiffness * material.youngs_modulus
             self._shear_moduli[index] = self._moduli[index] / (2.0 * (1.0 + material.poisson_ratio))
@@ -114,6 +129,8 @@ class EdgeFigures:
         if both.any():
             (bottom, top), moduli = self._layers[:, both], self._moduli[:, both]
             m, n = moduli[0] / moduli[1], bottom / top
+            (least, at_least), (most, at_most) = self.multiple_range
+            m = np.clip(1.0 / n**2, m * least / at_most, m * most / at_least)  # where it is largest
             shape = 6.0 * (1.0 + n) ** 2 / (3.0 * (1.0 + n) ** 2 + (1.0 + m * n) * (n**2 + 1.0 / (m * n)))
             curvature[both] = shape * eigenstrain[:, both].sum(axis=0) / (bottom + top)
         return curvature

@@ -33,7 +33,7 @@ def implausible_numbers(scene: SceneConfig) -> Iterator[Finding]:
         where, length = f"rods.{rod.name}", rod.path.length
         if length > LARGEST_ROBOT:
             yield _question(where, "is", f"{length:.3g} m long", "mm")
-        width = extremes(rod.width)[1]
+        width = rod.widest
         if width > length:
             yield _question(f"{where}.width", "is", f"{width:.3g} m, more than its length of {length:.3g} m", "mm")
         for layer in rod.layers:

@@ -96,13 +96,14 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
     elements = StrandElements(
         edge_mass=mass,
         spin_inertia=sum(layer.spin_inertia(axis + centre) for layer in layers),
-        half_width=0.5 * layers[0].section.width,
+        half_width=0.5 * outline(rod, nodes[:-1] + 0.5)[0],
         axial_stiffness=whole.axial_stiffness,
         rest_strain=whole.rest_strain,
         joint_stiffness=whole.joint_stiffness,
         joint_rest=whole.joint_rest,
         node_radius=np.maximum(high, -low),
         retardation_time=scene.materials[rod.layers[0].material].retardation_time,
+        modulus=found.modulus(scene, rod, rod.layers[0]),
     )
     middle = _middle(rod, axis)
     path = -axis if abs(axis) > ON_CURVE * _thickness(rod).sum(axis=0).max() else 0.0
@@ -163,7 +164,7 @@ def _strands(
     strands = []
     for number, (copy, curvature) in enumerate(zip(copies, shape.curvature, strict=True)):
         first = found.node_count + number * nodes, found.edge_count + number * (nodes - 1)
-        drawn = _drawn_layers(copy, axis, first, layers, width, curvature) if len(layers) > 1 else ()
+        drawn = _drawn_layers(copy, axis, first, layers, curvature) if len(layers) > 1 else ()
         strands.append(
             StrandArrays(
                 name=f"{copy.name}/{layer}",
@@ -275,12 +276,13 @@ def _faces(rod: Rod, axis: float) -> tuple[Array, Array]:
 
 
 def _drawn_layers(
-    copy: RodCopy, axis: float, at: tuple[int, int], thickness: Array, width: Array, curvature: Array
+    copy: RodCopy, axis: float, at: tuple[int, int], thickness: Array, curvature: Array
 ) -> tuple[StrandArrays, ...]:
     """Return each layer on those nodes of a laminate's strand where it is: its first node and edge, thicknesses of
-    layers [m], shape (n_layer, n_node), width [m] and curvature [1/m] of the strand, shape (n_node,).
+    layers [m], shape (n_layer, n_node), and curvature [1/m] of the strand, shape (n_node,).
     """
     rod, layers = copy.rod, []
+    along = rod.edge_length * rod.on_path(np.arange(len(curvature)))
     for slot, layer in enumerate(rod.layers):
         first, last = stations_of(rod, layer)
         own = slice(first, last + 1)
@@ -293,7 +295,7 @@ def _drawn_layers(
                 first_node=at[0] + first,
                 node_count=last - first + 1,
                 first_edge=at[1] + first,
-                width=width[own],
+                width=values_at(rod.width_of(layer), along[own]),
                 thickness=thickness[slot, own],
                 offset=side(rod, slot) * thickness[slot, own] - axis,
                 curvature=curvature[own],

@@ -20,6 +20,7 @@ from bilayer_core.model.records.parts import (
     Flow,
     Fluid,
     Joins,
+    Moduli,
     Moments,
     OffAxis,
     Plane,
@@ -75,6 +76,7 @@ class Model(ReadOnlyArrays):
     plane: Plane  # absent in three dimensions
     off_axis: OffAxis
     flattening: Flattening  # absent without strips
+    moduli: Moduli
     bonds: Bonds
     raised: Raised  # absent where everything acts on the curve
     kept_directors: int  # of edges where something may act off the curve under other loads, too

@@ -141,6 +141,8 @@ def simplest_model(scene: SceneConfig) -> tuple[str, str]:
             return "laminate", f"rods.{rod.name}: its section bends (`section: {rod.section}`), which two rods cannot"
         if len(_retardation_times(rod, scene)) > 1:
             return "two_rod", f"rods.{rod.name}: layers with different retardation times, of which a curve has one"
+        if _moves_its_axis(rod):
+            return "two_rod", f"rods.{rod.name}: layers whose moduli change unlike each other, which moves their axis"
         error = helix_error(scene, rod)
         if error > HELIX:
             return "two_rod", (
@@ -153,8 +155,22 @@ def _retardation_times(rod: Rod, scene: SceneConfig) -> set[float]:
     return {scene.materials[layer.material].retardation_time for layer in rod.layers}
 
 
+def _moves_its_axis(rod: Rod) -> bool:
+    """Return whether moduli of the layers of a rod change, and not alike."""
+    if len(rod.layers) == 1:
+        return False
+    changes = [[layer.stiffness_change for layer in variant.layers] for variant in rod.variants]
+    diffuses = any(law and rod.diffusion_of(layer, law) for layer, law in zip(rod.layers, changes[0], strict=True))
+    return diffuses or any(first != second for first, second in changes)
+
+
 def _refuse_laminate(scene: SceneConfig) -> None:
     for rod in scene.rods:
+        if _moves_its_axis(rod):
+            raise SceneError(
+                f"model: laminate has its curve on one neutral axis, which moves where the moduli of one layer of "
+                f"rods.{rod.name} change (`stiffness_change`); allowed: two_rod, or the same change in all layers"
+            )
         if len(times := _retardation_times(rod, scene)) > 1:
             raise SceneError(
                 f"model: laminate has one retardation time along a rod, the layers of rods.{rod.name} have "

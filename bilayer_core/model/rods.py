@@ -63,8 +63,8 @@ def _add_copy(found: Collected, scene: SceneConfig, copy: RodCopy, body_index: d
             closed=shape.closed,
             round=rod.radius is not None,
         )
-        time = scene.materials[layer.material].retardation_time
-        elements = _elements(rod, layer, at_nodes, at_edges, shape, time)
+        time, modulus = scene.materials[layer.material].retardation_time, found.modulus(scene, rod, layer)
+        elements = _elements(rod, layer, at_nodes, at_edges, shape, time, modulus)
         joints = add_strands(found, scene, rod, [strand], shape, elements, body_index)[0]
         _add_eigenstrain(found, scene, rod, slot, strand, shape, joints)
         strands.append(_Bonded(first, strand.first_node, strand.first_edge, shape, elements, joints))
@@ -129,7 +129,7 @@ def _sections(scene: SceneConfig, rod: Rod, layer: Layer, first: int, last: int)
 
 
 def _elements(
-    rod: Rod, layer: Layer, at_nodes: Section, at_edges: Section, shape: StrandShape, retardation_time: float
+    rod: Rod, layer: Layer, at_nodes: Section, at_edges: Section, shape: StrandShape, time: float, modulus: int
 ) -> StrandElements:
     stiffness = np.stack([*at_nodes.bending_stiffness, at_nodes.twisting_stiffness], axis=1)
     return StrandElements(
@@ -141,7 +141,8 @@ def _elements(
         joint_stiffness=stiffness / shape.voronoi[:, None],
         joint_rest=_rest(rod, layer, shape),
         node_radius=0.5 * at_nodes.thickness,
-        retardation_time=retardation_time,
+        retardation_time=time,
+        modulus=modulus,
     )
 
 
@@ -250,6 +251,8 @@ def _add_bond(found: Collected, scene: SceneConfig, rod: Rod, bottom: _Bonded, t
         bond_joint_time=np.stack([0.0 * weight, shear_time, 0.0 * weight], axis=1),
         bond_joint_rest=rest_strains(*frames[0], *frames[1]),
         bond_joint_node=np.full(last - first, -1),
+        bond_share=shear[1] / (shear[0] + shear[1]),
+        pair_modulus=np.full(last - first, -1),
         pair_joint=-1 - bonds,
         pair_node=np.stack([nodes[0], nodes[0] + 1, nodes[1], nodes[1] + 1], axis=1),
         pair_weight=np.full((last - first, 2), 0.5),
@@ -301,5 +304,6 @@ def _add_end(
         end_weight=weight[None],
         end_stiffness=[[0.0, twist, bend]],
         end_time=np.full((1, 3), layer.elements.retardation_time),
+        end_modulus=layer.elements.modulus,
         end_rest=[start + distance * np.array([0.0, -natural[2], natural[0]])],
     )

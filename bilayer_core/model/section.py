@@ -1,5 +1,5 @@
-"""Stiffness and inertia of sections: rectangles, alone and bonded in pairs (thickness h through the layer, width w),
-and round ones, hollow or not.
+"""Stiffness and inertia of sections: rectangles, alone and bonded in pairs (thickness h through the layer, width w,
+their middles one over the other), and round ones, hollow or not.
 
 All of them are given at some places along a path; arrays have shape (n_place,). Where a section changes along a rod,
 masses, axial stiffness and bonds take that in the middle of an edge; bending, twist, contact and drag that at the node.
@@ -70,25 +70,26 @@ def sections(rod: Rod, layer: Layer, material: Material, stations: Array) -> Sec
         stiffness = values_at(layer.stiffness, along)
         if rod.radius is not None:
             return tube(material, values_at(rod.radius, along), values_at(rod.inner_radius, along), stiffness)
-        return rectangle(material, values_at(rod.width, along), values_at(layer.thickness, along), stiffness)
+        return rectangle(material, values_at(rod.width_of(layer), along), values_at(layer.thickness, along), stiffness)
 
     return rod.keep(("sections", stations.tobytes()), (layer, material), made)
 
 
 def outline(rod: Rod, stations: Array) -> tuple[Array, Array]:
-    """Return the width of a rod and the thickness of its layers [m] at stations, which may be whole numbers or lie
-    between; shapes (n_place,) and (n_layer, n_place). Thickness is 0 where a layer is not: at stations outside those
-    nearest to its interval, and between two that it covers no part of.
+    """Return the width of a rod, that of the widest layer there, and the thickness of its layers [m] at stations, which
+    may be whole numbers or lie between; shapes (n_place,) and (n_layer, n_place). Thickness is 0 where a layer is not:
+    at stations outside those nearest to its interval, and between two that it covers no part of.
     """
     stations = rod.on_path(stations)
     along, edges = rod.edge_length * stations, np.floor(stations)
-    thickness = np.zeros((len(rod.layers), len(stations)))
+    width, thickness = np.zeros(len(stations)), np.zeros((len(rod.layers), len(stations)))
     for own, layer in zip(thickness, rod.layers, strict=True):
         first, last = rod.covered_stations(layer)
         at_station = (first <= stations) & (stations <= last)
         there = np.where(edges == stations, at_station, rod.covered_parts(edges, layer) > 0.0)
         own[:] = values_at(layer.thickness, along) * there
-    return values_at(rod.width, along), thickness
+        width = np.maximum(width, values_at(rod.width_of(layer), along) * there)
+    return width, thickness
 
 
 def rectangle(material: Material, width: Array, thickness: Array, stiffness: Array | float = 1.0) -> Section:
@@ -156,8 +157,8 @@ def bond(bottom: Section, top: Section, multiples: Coupling, torsion: str) -> Bo
     reduced = bottom.axial_stiffness * top.axial_stiffness / (bottom.axial_stiffness + top.axial_stiffness)
     tilt = np.zeros_like(distance2)
     if torsion == "laminate":
-        moduli, thickness = ([getattr(s, key) for s in (bottom, top)] for key in ("shear_modulus", "thickness"))
-        tilt = bond_torsion(np.array(moduli), bottom.width, np.array(thickness)) / distance2
+        parts = (np.array([getattr(s, key) for s in (bottom, top)]) for key in ("shear_modulus", "width", "thickness"))
+        tilt = bond_torsion(*parts) / distance2
     return Bond(
         translation=multiples.translation * reduced / distance2,
         bending=multiples.bending * reduced,

@@ -13,8 +13,8 @@ from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.imperfect_shapes import departure
 from bilayer_core.model.strand_arrays import StrandArrays
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.scene.diffusion_modes import Response, VariedModes
-from bilayer_core.scene.eigenstrain import Eigenstrain
+from bilayer_core.scene.diffusion_modes import Response, VariedModes, responses
+from bilayer_core.scene.eigenstrain import Following
 from bilayer_core.scene.pattern import Placement
 from bilayer_core.scene.rod import Layer, Rod
 
@@ -36,6 +36,8 @@ class Collected:
     """Channel, time constants rising and falling of the modes, and what varies, of all that follows a stimulus."""
     laws: list[tuple[int, tuple[float, ...], float, float, float]] = field(default_factory=list)
     """Field, weights of its modes, gain, reference, saturation of each eigenstrain law."""
+    moduli: list[int] = field(default_factory=list)
+    """Law of each multiple of elastic moduli (`forces.moduli`)."""
     node_count: int = 0
     edge_count: int = 0
     joint_count: int = 0
@@ -51,7 +53,7 @@ class Collected:
             return np.zeros((0,) if width is None else (0, width), dtype)
         return np.concatenate(parts).astype(dtype, order="C", copy=False)
 
-    def law(self, scene: SceneConfig, law: Eigenstrain, response: Response, alone: bool = False) -> tuple[int, int]:
+    def law(self, scene: SceneConfig, law: Following, response: Response, alone: bool = False) -> tuple[int, int]:
         """Return the numbers of the laws for mean and gradient of a response, the latter −1 without one; equal laws
         share one, unless it is for one element `alone`, which light reaches differently.
         """
@@ -68,6 +70,16 @@ class Collected:
             self.fields.append(followed)
         self.laws += [(field, *own) for own in laws]
         return len(self.laws) - len(laws), len(self.laws) - 1 if response.gradient else -1
+
+    def modulus(self, scene: SceneConfig, rod: Rod, layer: Layer) -> int:
+        """Return the number of the multiple of a layer's elastic moduli, −1 where these stay."""
+        if layer.stiffness_change is None:
+            return -1
+        (response,) = responses(rod, layer, layer.stiffness_change)
+        law, _ = self.law(scene, layer.stiffness_change, replace(response, gradient=()))
+        if law not in self.moduli:
+            self.moduli.append(law)
+        return self.moduli.index(law)
 
 
 @dataclass(frozen=True)
@@ -252,6 +264,7 @@ class StrandElements:
     joint_rest: Array  # κ̄₁ κ̄₂ ψ̄ [rad] without stimuli, shape (n_node, 3)
     node_radius: Array  # from which contact counts [m], shape (n_node,)
     retardation_time: float  # [s]
+    modulus: int  # number of the multiple of elastic moduli, −1 without one
 
 
 def add_strands(
@@ -309,6 +322,7 @@ def add_strands(
         axial_stiffness=of_all(own_edges * elements.axial_stiffness),
         rest_strain=of_all(elements.rest_strain),
         edge_time=np.full(count * edges, elements.retardation_time),
+        edge_modulus=np.full(count * edges, elements.modulus),
     )
     at = index[1:-1]
     pairs = np.stack([first_edge + at - 1, first_edge + at])
@@ -331,6 +345,7 @@ def add_strands(
         joint_stiffness=stiffness[:, at].reshape(-1, 3),
         joint_rest=rest[:, at].reshape(-1, 3),
         joint_time=np.full((numbers.size, 3), elements.retardation_time),
+        joint_modulus=np.full(numbers.size, elements.modulus),
         joint_node=(first_node + at).ravel(),
         voronoi_length=shape.voronoi.reshape(-1, nodes)[:, at].ravel(),
     )

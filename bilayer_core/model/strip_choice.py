@@ -71,6 +71,10 @@ def refusal(scene: SceneConfig, rod: Rod) -> str:
     if len({scene.materials[layer.material].retardation_time for layer in rod.layers}) > 1:
         return "needs layers with one retardation_time"
     for layer in rod.layers:
+        if layer.width is not None:
+            return f"needs layers of one width, that of the rod, and {layer.name} has a `width`"
+        if layer.stiffness_change is not None:
+            return f"needs layers whose moduli stay, and {layer.name} has a `stiffness_change`"
         if layer.interval is not None:
             return f"needs layers that cover all of it, and {layer.name} has an `interval`"
         if layer.natural_twist != 0.0:

@@ -33,8 +33,21 @@ has the classical series, across the shorter of its sides b ≤ a, in which tanh
 
     J = (a b³/3) [1 − (192 b/π⁵ a) (31 ζ(5)/32 − Σ_{m odd} m⁻⁵ 2/(e^{mπa/b} + 1))]
 
-Relative error: below 1e-7 for widths of 0.1 to 1000 thicknesses and ratios of moduli and thicknesses of 1e-3 to 1e3
-(`tests/physics/test_torsion_section.py`).
+Layers of unlike width. Modes of the wider one, of width W, are not those of the bond, of width v. Φ is at the maximum
+of 4 ∫∫ Φ − ∫∫ |∇Φ|²/G, which is GJ; with F = Σ_m a_m cos k_m y on the bond, F = Σ_n (2/W) Σ_m I_nm a_m cos K_n y in
+the wider layer,
+
+    I_nm = ∫_{−v/2}^{v/2} cos K_n y cos k_m y dy = 2 k_m (−1)^m cos(K_n v/2)/(k_m² − K_n²)
+
+the maximum over a is GJ − ΣGJ_r = ¼ bᵀ A⁻¹ b with
+
+    A = diag((v/2) k coth(kh)/G) + (2/W) Iᵀ diag(K coth(KH)/G_W) I
+    b_m = 8 (−1)^m tanh(k h/2)/k² + (16/W) Σ_n I_nm (−1)ⁿ tanh(K H/2)/K²
+
+`MODES` of them, up to `FINER` k_m in the wider layer, leave out up to 0.05 % of GJ, at the corners of the bond.
+
+Relative error of one width: below 1e-7 for widths of 0.1 to 1000 thicknesses and ratios of moduli and thicknesses of
+1e-3 to 1e3 (`tests/physics/test_torsion_section.py`).
 """
 
 from __future__ import annotations
@@ -45,6 +58,9 @@ Array = np.ndarray
 TERMS = 64
 ODD = np.arange(1.0, 12.0, 2.0)
 """m of the series of a rectangle: the next term is below 1e-20 of the sum."""
+MODES, FINER = 32, 4
+SAME = 1e-9
+"""Part by which the squares of two wave numbers may differ and count as one."""
 SUM_OF_ODD = 31.0 / 32.0 * 1.0369277551433699
 """31 ζ(5)/32 = Σ_{m odd} m⁻⁵."""
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
@@ -62,21 +78,28 @@ def rectangle_torsion(shear_modulus: Array, width: Array, thickness: Array) -> A
 
 
 def bond_torsion(shear_moduli: Array, width: Array, thickness: Array) -> Array:
-    """Return GJ_lam − ΣGJ of two layers that are bonded [N m²], above 0.
+    """Return GJ_lam − ΣGJ of two layers that are bonded in the middle of their widths [N m²], above 0.
 
     Parameters
     ----------
-    shear_moduli, thickness : ndarray
-        [Pa], [m], shape (2, n_place)
-    width : ndarray
-        [m], shape (n_place,)
+    shear_moduli, width, thickness : ndarray
+        [Pa], [m], [m], shape (2, n_place)
     """
-    sections = np.concatenate([shear_moduli, width[None], thickness])
+    sections = np.concatenate([shear_moduli, width, thickness])
     if np.all(sections == sections[:, :1]):  # most rods are uniform
-        sections, back = sections[:, :1], np.zeros(len(width), int)
+        sections, back = sections[:, :1], np.zeros(width.shape[1], int)
     else:
         sections, back = np.unique(sections, axis=1, return_inverse=True)
-    moduli, width, thickness = sections[:2, :, None], sections[2][:, None], sections[3:, :, None]
+    unlike = sections[2] != sections[3]
+    added = np.zeros(len(unlike))
+    added[~unlike] = _of_one_width(sections[:, ~unlike])
+    added[unlike] = [_of_unlike_widths(*part.reshape(3, 2)) for part in sections.T[unlike]]
+    return added[back.reshape(-1)]
+
+
+def _of_one_width(sections: Array) -> Array:
+    """Return GJ_lam − ΣGJ of sections G, w, h of two layers, shape (6, n_place)."""
+    moduli, width, thickness = sections[:2, :, None], sections[2][:, None], sections[4:, :, None]
 
     def term(k: Array) -> Array:
         s = np.tanh(0.5 * k * thickness).sum(axis=0)
@@ -85,4 +108,22 @@ def bond_torsion(shear_moduli: Array, width: Array, thickness: Array) -> Array:
     step = 2.0 * np.pi / width
     first = np.sum(term(step * (np.arange(TERMS) + 0.5)), axis=1)
     rest = TERMS * np.sum(WEIGHTS / NODES**2 * term(TERMS * step / NODES), axis=1)
-    return (32.0 / sections[2] * (first + rest))[back.reshape(-1)]
+    return 32.0 / sections[2] * (first + rest)
+
+
+def _of_unlike_widths(moduli: Array, width: Array, thickness: Array) -> float:
+    """Return GJ_lam − ΣGJ of one section of two layers, shapes (2,)."""
+    narrow, wide = np.argsort(width)
+    modes, finer = np.arange(MODES), np.arange(int(np.ceil(FINER * MODES * width[wide] / width[narrow])))
+    k, wide_k = ((2 * m + 1) * np.pi / width[own] for m, own in ((modes, narrow), (finer, wide)))
+    sign, wide_sign = (1.0 - 2.0 * (m % 2) for m in (modes, finer))
+    difference = k**2 - wide_k[:, None] ** 2
+    same = np.abs(difference) <= SAME * k**2
+    overlap = 2.0 * k * sign * np.cos(0.5 * wide_k * width[narrow])[:, None] / np.where(same, 1.0, difference)
+    overlap = np.where(same, 0.5 * width[narrow], overlap)
+    slope = wide_k / np.tanh(wide_k * thickness[wide]) / moduli[wide]
+    system = np.diag(0.5 * width[narrow] * k / np.tanh(k * thickness[narrow]) / moduli[narrow])
+    system += 2.0 / width[wide] * (overlap.T * slope) @ overlap
+    load = 8.0 * sign * np.tanh(0.5 * k * thickness[narrow]) / k**2
+    load += 16.0 / width[wide] * (wide_sign * np.tanh(0.5 * wide_k * thickness[wide]) / wide_k**2) @ overlap
+    return 0.25 * load @ np.linalg.solve(system, load)

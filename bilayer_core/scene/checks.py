@@ -36,7 +36,7 @@ def faults_of_scene(scene: SceneConfig) -> list[Fault]:
     if too_large:
         return too_large
     references = list(_references(scene))
-    rest_lengths = [] if references else _rest_lengths(scene)
+    rest_lengths = [] if references else [*_rest_lengths(scene), *_stiffness(scene)]
     parts = _clamps(scene), _joints(scene), _surfaces(scene), _points(scene), _drags(scene), _frictions(scene)
     return [*_names(scene), *references, *rest_lengths, *(fault for faults in parts for fault in faults)]
 
@@ -58,15 +58,18 @@ def _references(scene: SceneConfig) -> Iterator[Fault]:
             where: Location = ("rods", number, "layers", index)
             if layer.material not in scene.materials:
                 yield (*where, "material"), layer.material, one_of("materials", layer.material, scene.materials)
-            for place, law in enumerate(layer.eigenstrain):
+            for place, law in layer.laws.items():
                 if law.stimulus not in scene.stimuli:
                     demand = one_of("stimuli", law.stimulus, scene.stimuli)
-                    yield (*where, "eigenstrain", place, "stimulus"), law.stimulus, demand
-                names = {variant.layers[index].eigenstrain[place].stimulus for variant in rod.variants}
+                    yield (*where, *place, "stimulus"), law.stimulus, demand
+                names = {variant.layers[index].laws[place].stimulus for variant in rod.variants}
                 lights = [name for name in sorted(names & scene.stimuli.keys()) if scene.stimuli[name].light]
-                if lights and min(law.lags) == 0.0 and rod.diffusion_of(layer, law) is None:
+                if lights and place == ("stiffness_change",):
+                    demand = f"must be a channel that all of the layer sees alike: `{lights[0]}` is a light"
+                    yield (*where, *place, "stimulus"), law.stimulus, demand
+                elif lights and min(law.lags) == 0.0 and rod.diffusion_of(layer, law) is None:
                     demand = f"must be a time [s] above 0, rising and falling: `{lights[0]}` is a light"
-                    yield (*where, "eigenstrain", place, "time_constant"), law.time_constant, demand
+                    yield (*where, *place, "time_constant"), law.time_constant, demand
         for index, field in enumerate(rod.diffusion):
             own = {variant.diffusion[index].stimulus for variant in rod.variants}
             if field.along and any(scene.stimuli[name].light for name in own & scene.stimuli.keys()):
@@ -159,6 +162,27 @@ def _rest_length(scene: SceneConfig, rod: Rod, index: int) -> tuple[float, int, 
         "by a smaller gain, a `saturation` below 1 or a narrower range of the channel"
     )
     return least, place, law.gain, demand
+
+
+def _stiffness(scene: SceneConfig) -> Iterator[Fault]:
+    """Yield a fault for each layer that loses all its stiffness for what its channels allow."""
+    for number, rod in enumerate(scene.rods):
+        for index in range(len(rod.layers)):
+            for variant in rod.variants:
+                law = variant.layers[index].stiffness_change
+                if law is None:
+                    continue
+                channel = scene.stimuli[law.stimulus]
+                ends = np.array([channel.minimum, channel.maximum])
+                least = float(strain_at(variant, variant.layers[index], law, ends).min())
+                if least <= -1.0:
+                    demand = (
+                        f"must leave the layer stiff: `{law.stimulus}` from {channel.minimum:g} to {channel.maximum:g} "
+                        f"[{channel.unit}] can change its moduli by {100 * least:.4g} %; allowed is above -100 %, by a "
+                        "smaller gain, a `saturation` below 1 or a narrower range of the channel"
+                    )
+                    yield ("rods", number, "layers", index, "stiffness_change", "gain"), law.gain, demand
+                    break
 
 
 SAMPLES = 257

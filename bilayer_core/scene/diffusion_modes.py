@@ -40,7 +40,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from bilayer_core.scene.diffusion import Diffusion, DiffusivityCurve
-from bilayer_core.scene.eigenstrain import Eigenstrain
+from bilayer_core.scene.eigenstrain import Following
 from bilayer_core.scene.rod import Layer, Rod
 
 Array = np.ndarray
@@ -111,7 +111,7 @@ class Response:
     varied: VariedModes | None = None
 
 
-def responses(rod: Rod, layer: Layer, law: Eigenstrain) -> list[Response]:
+def responses(rod: Rod, layer: Layer, law: Following) -> list[Response]:
     """Return the responses of a layer by a law, whose sum is its eigenstrain: one, or where the field spreads along
     the rod one for each cosine.
     """
@@ -122,7 +122,7 @@ def responses(rod: Rod, layer: Layer, law: Eigenstrain) -> list[Response]:
     return [_response(part, layer, law) for part in made]
 
 
-def strain_at(rod: Rod, layer: Layer, law: Eigenstrain, stimulus: Array) -> Array:
+def strain_at(rod: Rod, layer: Layer, law: Following, stimulus: Array) -> Array:
     """Return the mean eigenstrain of a layer by a law where it has long had a stimulus all along the rod."""
     field = rod.diffusion_of(layer, law)
     if field is None:
@@ -137,7 +137,7 @@ def whole_field(rod: Rod, field: Diffusion) -> FieldPart:
     return rod.keep("field", (field,), lambda: FieldPart(FieldModes(rod, field), 1.0, 1.0, None))
 
 
-def _response(part: FieldPart, layer: Layer, law: Eigenstrain) -> Response:
+def _response(part: FieldPart, layer: Layer, law: Following) -> Response:
     slot = part.modes.names.index(layer.name)
     (mean, mean_offset), (gradient, gradient_offset) = (part.weights(of[slot]) for of in part.modes.functionals)
     return Response(

@@ -55,20 +55,15 @@ def _gain_or_law(schema: dict[str, Any]) -> None:
     schema["anyOf"] = [{"required": ["gain"]}, {"required": ["law"]}]
 
 
-class Eigenstrain(Part):
-    """Free strain of a layer: gain times the stimulus, which the material follows with a first-order lag."""
-
-    model_config = ConfigDict(json_schema_extra=_gain_or_law)
+class Following(Part):
+    """Law by which a layer follows a stimulus, with a first-order lag."""
 
     stimulus: str
     """One of the channels in `stimuli`."""
-    law: Literal[*LAWS] | None = Field(None, exclude=True)
-    """Ready-made numbers for keys that are not given; see docs/stimuli.md."""
     gain: Number
-    """Eigenstrain per unit of the stimulus, near `reference`; may be left out where `law` is given. The laws of
-    a layer together must leave it a length: above −1 over the ranges of their channels."""
+    """Per unit of the stimulus, near `reference`."""
     reference: PlainNumber = 0.0
-    """Stimulus without eigenstrain, in the unit of the channel."""
+    """Stimulus at which nothing changes, in the unit of the channel."""
     time_constant: NonNegativeTime | None = None
     """Both ways; without any the material follows at once."""
     time_constant_rising: NonNegativeTime | None = None
@@ -76,7 +71,52 @@ class Eigenstrain(Part):
     time_constant_falling: NonNegativeTime | None = None
     """While it is below."""
     saturation: PositiveNumber | None = None
-    """Magnitude that the eigenstrain tends to but does not exceed."""
+    """Magnitude that it tends to but does not exceed."""
+
+    def _faults(self) -> Iterator[Fault]:
+        directions = ("time_constant_rising", "time_constant_falling")
+        given = [key for key in directions if getattr(self, key) is not None]
+        if self.time_constant is not None and given:
+            yield ("time_constant",), self.time_constant, f"must be left out where `{given[0]}` is given"
+
+    @property
+    def lags(self) -> tuple[float, float]:
+        """Time constants for a rising and a falling stimulus [s]."""
+        both = self.time_constant or 0.0
+        rising, falling = self.time_constant_rising, self.time_constant_falling
+        return both if rising is None else rising, both if falling is None else falling
+
+    def strain_at(self, stimulus: np.ndarray) -> np.ndarray:
+        """Return the value where the material has reached a stimulus (`scene.transduction.eigenstrain_of`)."""
+        strain = self.gain * (stimulus - self.reference)
+        return strain if self.saturation is None else self.saturation * np.tanh(strain / self.saturation)
+
+    @property
+    def limit(self) -> float:
+        """Saturation, infinite without one."""
+        return math.inf if self.saturation is None else self.saturation
+
+
+class StiffnessChange(Following):
+    """Part by which the elastic moduli of a layer change: gain times the stimulus, which the material follows with a
+    first-order lag.
+    """
+
+    gain: Number
+    """Change per unit of the stimulus, near `reference`, as a part: −60 % for a layer that keeps two fifths. It must
+    leave the layer stiff: above −1 over the range of the channel."""
+
+
+class Eigenstrain(Following):
+    """Free strain of a layer: gain times the stimulus, which the material follows with a first-order lag."""
+
+    model_config = ConfigDict(json_schema_extra=_gain_or_law)
+
+    law: Literal[*LAWS] | None = Field(None, exclude=True)
+    """Ready-made numbers for keys that are not given; see docs/stimuli.md."""
+    gain: Number
+    """Eigenstrain per unit of the stimulus, near `reference`; may be left out where `law` is given. The laws of
+    a layer together must leave it a length: above −1 over the ranges of their channels."""
     interval: tuple[NonNegativeLength, PositiveLength] | None = None
     """From and to, as lengths along the path [m]; default: the whole layer."""
 
@@ -93,26 +133,3 @@ class Eigenstrain(Part):
         if "time_constant" in data:
             numbers = {key: number for key, number in numbers.items() if not key.startswith("time_constant")}
         return handler({**numbers, **data, "law": None})
-
-    def _faults(self) -> Iterator[Fault]:
-        directions = ("time_constant_rising", "time_constant_falling")
-        given = [key for key in directions if getattr(self, key) is not None]
-        if self.time_constant is not None and given:
-            yield ("time_constant",), self.time_constant, f"must be left out where `{given[0]}` is given"
-
-    @property
-    def lags(self) -> tuple[float, float]:
-        """Time constants for a rising and a falling stimulus [s]."""
-        both = self.time_constant or 0.0
-        rising, falling = self.time_constant_rising, self.time_constant_falling
-        return both if rising is None else rising, both if falling is None else falling
-
-    def strain_at(self, stimulus: np.ndarray) -> np.ndarray:
-        """Return the eigenstrain where the material has reached a stimulus (`scene.transduction.eigenstrain_of`)."""
-        strain = self.gain * (stimulus - self.reference)
-        return strain if self.saturation is None else self.saturation * np.tanh(strain / self.saturation)
-
-    @property
-    def limit(self) -> float:
-        """Saturation, infinite without one."""
-        return math.inf if self.saturation is None else self.saturation

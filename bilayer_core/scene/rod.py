@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, Field, SerializerFunctionWrapHandler, fiel
 
 from bilayer_core.scene.close_paths import crossings
 from bilayer_core.scene.diffusion import Diffusion
-from bilayer_core.scene.eigenstrain import Eigenstrain
+from bilayer_core.scene.eigenstrain import Eigenstrain, Following, StiffnessChange
 from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, repeated
 from bilayer_core.scene.friction import Coefficients
 from bilayer_core.scene.imperfection import Imperfection
@@ -84,12 +84,16 @@ class Layer(Part):
     """One of `materials`."""
     thickness: varying(PositiveLength) | None = None
     """Through the bond. Must be given, but for a round rod (`radius`)."""
+    width: varying(PositiveLength) | None = None
+    """Of this layer, in the middle of the rod's; that of the rod by default."""
     interval: tuple[NonNegativeLength, PositiveLength] | None = None
     """From and to, as lengths along the path [m]."""
     eigenstrain: Eigenstrains = []
     """One law or several, which add up."""
     stiffness: varying(PositiveNumber) = 1.0
     """Multiple of the material's elastic moduli."""
+    stiffness_change: StiffnessChange | None = None
+    """With a stimulus, as of a shape-memory alloy or a gel; none by default."""
     natural_curvature: varying(Curvature) | None = None
     """Of the layer by itself, through the thickness, positive where it bends to the normal; default: the path's."""
     natural_curvature_across: varying(Curvature) | None = None
@@ -112,7 +116,16 @@ class Layer(Part):
             law.model_copy(update={"stimulus": channels.get(law.stimulus, law.stimulus), "gain": gain * law.gain})
             for law in self.eigenstrain
         ]
-        return self.model_copy(update={"eigenstrain": laws})
+        change = self.stiffness_change
+        if change is not None:
+            change = change.model_copy(update={"stimulus": channels.get(change.stimulus, change.stimulus)})
+        return self.model_copy(update={"eigenstrain": laws, "stiffness_change": change})
+
+    @property
+    def laws(self) -> dict[Location, Following]:
+        """All that follows a stimulus, by its place in the layer."""
+        laws: dict[Location, Following] = {("eigenstrain", k): law for k, law in enumerate(self.eigenstrain)}
+        return laws if self.stiffness_change is None else laws | {("stiffness_change",): self.stiffness_change}
 
     @field_serializer("eigenstrain")
     def _as_written(self, laws: list[Eigenstrain]) -> Any:
@@ -126,7 +139,9 @@ class Rod(Part):
     name: Name
     """Unique among rods, bodies and obstacles."""
     width: varying(PositiveLength) | None = None
-    """Of its rectangular section, across path and normal. Must be given, but for a round rod."""
+    """Of its rectangular section, across path and normal. Must be given, but for a round rod, and where each layer has
+    one.
+    """
     radius: varying(PositiveLength) | None = None
     """Of a round rod of one layer, in place of width and thickness."""
     inner_radius: varying(NonNegativeLength) = 0.0
@@ -168,6 +183,15 @@ class Rod(Part):
     """At the start, of a rod that nothing holds; others move as what holds them, or as the scene says."""
     angular_velocity: AngularVelocity | None = None
     """Likewise, about the rod's mass centre."""
+
+    def width_of(self, layer: Layer) -> float | Profile:
+        """Return the width of a layer [m]."""
+        return self.width if layer.width is None else layer.width
+
+    @property
+    def widest(self) -> float:
+        """Largest width of its layers [m]."""
+        return max(extremes(self.width_of(layer))[1] for layer in self.layers)
 
     @property
     def edge_length(self) -> float:
@@ -239,11 +263,11 @@ class Rod(Part):
     def _variants(self) -> tuple[Rod, ...]:
         found: dict[Any, Rod] = {}
         for rod in {id(copy.rod): copy.rod for copy in self.copies}.values():
-            laws = tuple(tuple(layer.eigenstrain) for layer in rod.layers)
+            laws = tuple(tuple(layer.laws.values()) for layer in rod.layers)
             found.setdefault((rod.clamp_start, rod.clamp_end, laws), rod)
         return tuple(found.values())
 
-    def diffusion_of(self, layer: Layer, law: Eigenstrain) -> Diffusion | None:
+    def diffusion_of(self, layer: Layer, law: Following) -> Diffusion | None:
         """Return the field that a law of a layer follows; None if it follows its stimulus with a lag."""
         fields = (f for f in self.diffusion if f.stimulus == law.stimulus and layer.name in f.diffusivity)
         return next(fields, None)
@@ -341,8 +365,7 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
             faults.append((("imperfection", "size"), rod.imperfection.size, demand))
     for index, layer in enumerate(rod.layers):
         faults += _bent_across(rod, index)
-        varying = ("thickness", "stiffness", "natural_curvature", "natural_curvature_across", "natural_twist")
-        faults += _profiles(layer, ("layers", index), varying, rod.path.length)
+        faults += _profiles(layer, ("layers", index), VARYING, rod.path.length)
         for number, law in enumerate(layer.eigenstrain):
             where: Location = ("layers", index, "eigenstrain", number, "interval")
             if law.interval is not None and not is_ordered(law.interval):
@@ -376,7 +399,12 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
 def _sections(rod: Rod) -> Iterator[Fault]:
     """Yield the faults of what a rod's sections are given by; the width and thickness of a round one are written."""
     layers = [((), rod, "width"), *((("layers", k), layer, "thickness") for k, layer in enumerate(rod.layers))]
+    own = [(("layers", k, "width"), layer.width) for k, layer in enumerate(rod.layers) if layer.width is not None]
     if rod.radius is None:
+        if len(own) == len(rod.layers):
+            if rod.width is not None:
+                yield ("width",), rod.width, "must be left out: each layer has a `width` of its own"
+            del layers[0]
         for where, part, key in layers:
             if getattr(part, key) is None:
                 yield (*where, key), None, "must be given (a length [m], such as 2 mm), but for a round rod (`radius`)"
@@ -386,6 +414,8 @@ def _sections(rod: Rod) -> Iterator[Fault]:
     if len(rod.layers) == 2:
         yield ("radius",), rod.radius, "must be left out: a rod of two layers has rectangular sections"
         return
+    for where, width in own:
+        yield where, width, "must be left out: the rod has a `radius`"
     diameter = doubled(rod.radius)
     for where, part, key in layers:
         if getattr(part, key) not in (None, diameter):
@@ -439,14 +469,17 @@ def _faults_of_diffusion(rod: Rod) -> Iterator[Fault]:
             yield (*where, "interval"), field.interval, demand
         followed = False
         for slot, layer in enumerate(rod.layers):
-            for number, law in enumerate(layer.eigenstrain):
+            for place, law in layer.laws.items():
                 if rod.diffusion_of(layer, law) is not field:
                     continue
                 followed = True
+                if field.along and place == ("stiffness_change",):
+                    demand = "must be of a field that is alike all along the rod, and that of `diffusion` is not"
+                    yield ("layers", slot, *place, "stimulus"), law.stimulus, demand
                 for key in LAGS:
                     if getattr(law, key) is not None:
                         demand = "must be left out: the layer follows the rod's `diffusion`"
-                        yield ("layers", slot, "eigenstrain", number, key), getattr(law, key), demand
+                        yield ("layers", slot, *place, key), getattr(law, key), demand
         if not followed:
             demand = f"must be that of a law of a layer in `diffusivity` ({', '.join(field.diffusivity)})"
             yield (*where, "stimulus"), field.stimulus, demand
@@ -466,6 +499,8 @@ def _faults_of_section(rod: Rod) -> Iterator[Fault]:
             yield ("layers", index, "swelling"), layer.swelling, demand
 
 
+VARYING = ("thickness", "width", "stiffness", "natural_curvature", "natural_curvature_across", "natural_twist")
+"""Keys of a layer that may be profiles."""
 LEAST_CLOSED = 5
 """Stations of a closed rod: four edges."""
 
@@ -479,8 +514,7 @@ def _faults_of_closed(rod: Rod) -> Iterator[Fault]:
             if getattr(holder, end, None) is not None:
                 yield (*where, end), getattr(holder, end), "must be left out: a closed path has no ends to hold"
     parts = [((), rod, ("width", "inner_radius"))]
-    names = ("thickness", "stiffness", "natural_curvature", "natural_curvature_across", "natural_twist")
-    parts += [(("layers", index), layer, names) for index, layer in enumerate(rod.layers)]
+    parts += [(("layers", index), layer, VARYING) for index, layer in enumerate(rod.layers)]
     for where, part, keys in parts:
         for key in keys:
             first, last = values_at(getattr(part, key) or 0.0, np.array([0.0, rod.path.length]))
@@ -522,12 +556,11 @@ POINTS_COMPARED = 9
 
 def _faults_of_copies(rod: Rod) -> Iterator[Fault]:
     """Yield the faults of a pattern: laws that the rod lacks, clamps that it has itself, copies at one place."""
-    laws = [law for layer in rod.layers for law in layer.eigenstrain]
-    channels = dict.fromkeys(law.stimulus for law in laws)
+    channels = dict.fromkeys(law.stimulus for layer in rod.layers for law in layer.laws.values())
     for name in rod.pattern.stimuli:
         if name not in channels:
-            yield ("pattern", "stimuli", name), name, one_of("channels in the rod's eigenstrain laws", name, channels)
-    if rod.pattern.gains is not None and not laws:
+            yield ("pattern", "stimuli", name), name, one_of("channels in the rod's laws", name, channels)
+    if rod.pattern.gains is not None and not any(layer.eigenstrain for layer in rod.layers):
         yield ("pattern", "gains"), rod.pattern.gains, "must be left out: no layer has an eigenstrain"
     for end in ("clamp_start", "clamp_end"):
         if getattr(rod, end) is not None and getattr(rod.pattern, end) is not None:
@@ -542,10 +575,10 @@ def _faults_of_copies(rod: Rod) -> Iterator[Fault]:
 
 def _bent_across(rod: Rod, index: int) -> Iterator[Fault]:
     """Yield a fault where the inner border of a layer would have no length by its natural curvature."""
-    bend = rod.layers[index].natural_curvature_across
+    bend, width = rod.layers[index].natural_curvature_across, extremes(rod.width_of(rod.layers[index]))[1]
     worst = max(map(abs, extremes(bend))) if bend is not None else 0.0
-    if 0.5 * worst * extremes(rod.width)[1] >= 1.0:
-        demand = f"must be below {2.0 / extremes(rod.width)[1]:g} 1/m: the inner border would have no length"
+    if 0.5 * worst * width >= 1.0:
+        demand = f"must be below {2.0 / width:g} 1/m: the inner border would have no length"
         yield ("layers", index, "natural_curvature_across"), worst, demand
 
 
@@ -560,7 +593,7 @@ def _sharp_bends(rod: Rod) -> Iterator[Fault]:
     share = 0.5 if len(rod.layers) == 1 else 1.0
     inner = [rod.layers[-1 if curvature > 0.0 else 0] for curvature in towards]
     distance = share * np.array([extremes(layer.thickness)[1] for layer in inner])
-    half_width = np.full(len(arc), 0.5 * extremes(rod.width)[1])
+    half_width = np.full(len(arc), 0.5 * rod.widest)
     faces = [f"the inner face of layer {layer.name}" for layer in inner]
     borders = ["its inner border"] * len(arc)
     for curvature, away, names in ((np.abs(towards), distance, faces), (np.abs(across), half_width, borders)):

@@ -40,7 +40,7 @@ def _natural(model: Model, state: State) -> tuple[Array, Array, Array]:
     strain = free_strain(state.transduction, drives.law_gain, drives.law_reference, drives.law_saturation)
     driven = drives.driven_joint, drives.driven_joint_column
     np.add.at(rest, driven, drives.driven_joint_weight * strain[drives.driven_joint_law])
-    return rest[strips.joint, 0], rest[strips.joint, 2], rest[strips.first :, 0]
+    return rest[strips.joint, 0], rest[strips.joint, 2], rest[strips.first :][: len(strips.joint), 0]
 
 
 def curvatures(model: Model, state: State) -> tuple[Array, Array]:

@@ -39,11 +39,18 @@ def _sums(matrix):
 
 
 def section_torsion(shear_moduli, thickness, width, count):
-    """Bounds of GJ from below and above: Prandtl's stress function, and St-Venant's warping ω.
+    """Bounds of GJ from below and above: Prandtl's stress function, and St-Venant's warping ω. A pair of widths is that
+    of the two layers, whose middles are one over the other; ∞ stands for the bound from above then.
 
     GJ = max 4 ∫∫ Φ − ∫∫ |∇Φ|²/G with Φ = 0 on the outline, = min ∫∫ G [(∂ω/∂y − z)² + (∂ω/∂z + y)²].
     """
+    unlike = np.ndim(width) > 0
+    widths, width = np.broadcast_to(width, 2), np.max(width)
     y = graded(-width / 2, width / 2, 2 * count)
+    if unlike:
+        half = min(widths) / 2
+        border = graded(half, width / 2, count)
+        y = np.concatenate([-border[::-1], graded(-half, half, 2 * count)[1:-1], border])
     z = np.concatenate([graded(-thickness[0], 0, count), graded(0, thickness[1], count)[1:]])
     g = np.repeat(shear_moduli, count)
     nodes_y, nodes_z = with_middles(y), with_middles(z)
@@ -51,9 +58,15 @@ def section_torsion(shear_moduli, thickness, width, count):
 
     mass_z, _, stiff_z = line(z, 1 / g)
     system = (sparse.kron(stiff_y, mass_z) + sparse.kron(mass_y, stiff_z)).tocsc()
-    inside = np.pad(np.ones((len(nodes_y) - 2, len(nodes_z) - 2), bool), 1).ravel()
+    inside = np.pad(np.ones((len(nodes_y) - 2, len(nodes_z) - 2), bool), 1)
+    rounding = 1e-9 * width
+    for own, outer in zip(widths, (nodes_z <= rounding, nodes_z >= -rounding), strict=True):
+        inside &= (abs(nodes_y) < own / 2 - rounding)[:, None] | ~outer
+    inside = inside.ravel()
     load = 2 * np.kron(_sums(mass_y), _sums(line(z)[0]))[inside]
     low = load @ spsolve(system[inside][:, inside], load)
+    if unlike:
+        return low, np.inf
 
     mass_z, gradient_z, stiff_z = line(z, g)
     system = (sparse.kron(stiff_y, mass_z) + sparse.kron(mass_y, stiff_z)).tocsc()

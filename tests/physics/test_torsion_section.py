@@ -20,12 +20,20 @@ SECTIONS = {  # shear moduli, thicknesses (bottom, then top), width
     "a film on a strip": ((1, 5), (0.05, 1), 3),
     "wide": ((1, 1.7), (1, 0.1), 100),
 }
+UNLIKE = {
+    "a T": ((1, 1), (1, 1), (10, 4)),
+    "a T upside down, of a soft foot": ((1, 0.2), (1, 1), (4, 10)),
+    "of a soft flange": ((0.2, 1), (1, 1), (10, 4)),
+    "nearly alike": ((1, 0.5), (1, 1), (20, 18)),
+    "thick": ((1, 2), (1, 3), (4, 3)),
+}
 
 
 def layered(moduli, thickness, width):
     """GJ of each layer, and what the bond adds."""
     moduli, thickness = np.array(moduli, float), np.array(thickness, float)
-    bond = bond_torsion(moduli[:, None], np.array([float(width)]), thickness[:, None])
+    width = np.broadcast_to(np.array(width, float), 2)
+    bond = bond_torsion(moduli[:, None], width[:, None], thickness[:, None])
     return rectangle_torsion(moduli, width, thickness), bond[0]
 
 
@@ -39,6 +47,18 @@ def test_torsion_of_a_layered_section_lies_between_bounds_that_close_in_on_it(na
         assert low <= own.sum() + bond <= high
         gaps.append(high / low - 1)
     assert gaps[1] < 0.3 * gaps[0] and gaps[1] < 1e-3
+
+
+@pytest.mark.parametrize("name", UNLIKE)
+def test_torsion_of_layers_of_unlike_width_is_that_by_finite_elements(name):
+    own, bond = layered(*UNLIKE[name])
+    low, high = section_torsion(*UNLIKE[name], 20)
+    assert 0.9995 * low <= own.sum() + bond <= high
+
+
+def test_layers_of_nearly_one_width_have_nearly_the_torsion_of_one():
+    like, nearly = layered((1, 3), (1, 0.5), 4.0)[1], layered((1, 3), (1, 0.5), (4.0, 4.0 * (1 - 1e-7)))[1]
+    assert nearly == pytest.approx(like, rel=1e-3)
 
 
 def test_rectangles_have_the_torsion_that_tables_give():
@@ -61,11 +81,12 @@ def test_a_wide_strip_tends_to_the_thin_formula():
 
 
 def test_sections_that_vary_along_a_rod_are_those_of_each_place():
-    moduli, width, thickness = np.array([[1, 1, 2, 1], [3, 3, 3, 3.0]]), np.array([5, 5, 5, 9.0]), np.ones((2, 4))
+    moduli, width = np.array([[1, 1, 2, 1], [3, 3, 3, 3.0]]), np.array([[5, 5, 5, 9.0], [5, 5, 5, 7.0]])
+    thickness = np.ones((2, 4))
     together = bond_torsion(moduli, width, thickness)
     for place in range(4):
         one = slice(place, place + 1)
-        assert bond_torsion(moduli[:, one], width[one], thickness[:, one])[0] == pytest.approx(
+        assert bond_torsion(moduli[:, one], width[:, one], thickness[:, one])[0] == pytest.approx(
             together[place], rel=1e-14
         )
 

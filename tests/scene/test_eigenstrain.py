@@ -151,7 +151,7 @@ def test_adjoining_intervals_cover_each_edge_of_the_layer_once():
         ({"stimulus": "humidity"}, ".gain: is missing; must be a number, such as 0.5"),
         (
             {"stimulus": "humidity", "gain": 1, "gian": 1},
-            ".gian: unknown key, did you mean gain?; allowed are stimulus, law, gain",
+            ".gian: unknown key, did you mean gain?; allowed are stimulus, gain, reference",
         ),
         ({"stimulus": "humidity", "gain": "1 mm"}, '.gain: found "1 mm", a quantity in m; must be a number'),
         ({"stimulus": "humidity", "gain": 1, "saturation": 0}, ".saturation: found 0; must be a number above 0"),

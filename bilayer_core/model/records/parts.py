@@ -51,7 +51,7 @@ class Drives:
     driven_edge: Indices  # edges that follow a law, once for each law, shape (n_driven,)
     driven_law: Indices  # the law that each of them follows, shape (n_driven,)
     driven_weight: Vector  # its part of the law's eigenstrain, shape (n_driven,)
-    joint_rest: Matrix  # κ̄₁ κ̄₂ ψ̄ without stimuli, then κ̄y Δl of strips [rad], shape (n_joint + n_strip_joint, 3)
+    joint_rest: Matrix  # κ̄₁ κ̄₂ ψ̄ without stimuli, κ̄y Δl of strips [rad], multiples of `Moduli`, shape (n_joint rest, 3)
     driven_joint: Indices  # rows of `joint_rest` that follow a law, once for each law, shape (n_driven_joint,)
     driven_joint_column: Indices  # which value of the row does: 0, κ̄₁ or κ̄y Δl, or of a strip 2, ψ̄, likewise
     driven_joint_law: Indices  # likewise
@@ -118,6 +118,18 @@ class Flattening:
     series: Stack  # coefficients of φ, see `model.plate_strip.flattening_series`, shape (n_strip_joint, 4, n_term)
     pull: Matrix = ("joint rest", 3)  # derivative of the energy by `Stage.rest_joint` [N m]
     slope: Vector = ("strip joint",)  # second derivative by κ̄y Δl [N m]
+
+
+@record
+class Moduli:
+    """Elements whose stiffness follows a stimulus; absent without any. See `forces.moduli`."""
+
+    first: int  # row of `Stage.rest_joint` with the first multiple; the last row is 1
+    edge: Indices  # row with the multiple of each edge, shape (n_edge,)
+    joint: Indices  # likewise of each joint of `Strands` that bends, then 1 for those of bonds, shape (n_joint,)
+    pair: Indices  # likewise of each vector of `Bonds`, shape (n_pair,)
+    share: Vector  # σ of the first layer of each bond, 0 for other joints, shape (n_joint,)
+    pull: Vector = ("joint rest",)  # derivative of the energy by each row of `Stage.rest_joint` [J]
 
 
 @record

@@ -16,6 +16,7 @@ from bilayer_core.model.records.parts import (
     Fluid,
     Joins,
     Mechanisms,
+    Moduli,
     Moments,
     OffAxis,
     Plane,
@@ -175,6 +176,7 @@ class Problem:
     plane: Plane
     off_axis: OffAxis
     flattening: Flattening
+    moduli: Moduli
     bonds: Bonds
     raised: Raised
     bodies: Bodies

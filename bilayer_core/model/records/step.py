@@ -68,7 +68,10 @@ class Stage:
     twist: Vector = ("joint",)  # of joints at the start of the stage
     origin_strain: Vector = ("strain",)  # of all elements; see `forces.viscosity`
     rest_edge: Vector = ("edge",)  # strains without stress
-    rest_joint: Matrix = ("joint rest", 3)  # of joints, without what strains off the axis add; then κ̄y Δl of strips
+    rest_joint: Matrix = (
+        "joint rest",
+        3,
+    )  # of joints, without what strains off the axis add; then κ̄y Δl of strips, `Moduli`
     axial_stiffness: Vector = ("edge",)  # of elasticity and viscosity together [N]
     neutral_edge: Vector = ("edge",)  # and the strain at which these balance
     joint_stiffness: Matrix = ("joint", 3)  # likewise of joints [N m]

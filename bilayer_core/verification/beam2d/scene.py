@@ -92,7 +92,9 @@ def _only_rod(scene: SceneConfig) -> Rod:
         "rods[0].layers: must be two over the whole path": len(layers) == 2
         and all(layer.interval is None for layer in layers),
         "rods[0]: width, thickness and stiffness must not vary": not any(
-            isinstance(value, Profile) for layer in layers for value in (rod.width, layer.thickness, layer.stiffness)
+            isinstance(value, Profile)
+            for layer in layers
+            for value in (rod.width_of(layer), layer.thickness, layer.stiffness)
         ),
         "rods[0].imperfection: must be none": rod.imperfection is None,
         "rods[0].layers: natural curvature and twist must be zero": not any(

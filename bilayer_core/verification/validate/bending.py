@@ -57,6 +57,21 @@ def beam2d(m: float, n: float, eigenstrain: float) -> float:
     return -beam.curvatures[STATIONS // 2] * THICKNESS / eigenstrain
 
 
+@cache
+def softened(n: float, multiple: float) -> float:
+    """Return κH/η where a second stimulus takes the moduli of the top layer from those of the bottom one to a multiple
+    of them, after it has grown.
+    """
+    content = strip(1.0, n, FIGURE_STRAIN)
+    content["rods"][0]["layers"][1]["stiffness_change"] = {"stimulus": "warmth", "gain": multiple - 1.0}
+    content["stimuli"]["warmth"] = {"schedule": {"type": "hold", "value": 0}}
+    simulator = Simulator(load_scene(content))
+    simulator.solve_static()
+    simulator.set_stimulus("warmth", 1.0)
+    simulator.solve_static()
+    return -simulator.curvatures[STATIONS // 2] * THICKNESS / FIGURE_STRAIN
+
+
 def across(model: str, of_path: float, of_layers: float) -> tuple[float, float]:
     """Return the distance of the ends [m] of a strip that is bent across its width [1/m], and has rest at another."""
     length, angle = 0.1, of_path * np.linspace(0.0, 0.1, STATIONS)
@@ -101,6 +116,16 @@ CASES = (
         _case(f"bending/pair m = {m:g}, n = {n:g}/{100 * strain:g} %", "two_rod", m, n, strain)
         for m, n in PAIRS
         for strain in (0.005, 0.05)
+    ]
+    + [
+        Case(
+            f"bending/top layer of moduli times {multiple:g}/n = {n:g}",
+            "Timoshenko's bilayer at these moduli",
+            0.001,
+            lambda n=n, multiple=multiple: (softened(n, multiple), timoshenko(1.0 / multiple, n)),
+        )
+        for multiple in (0.1, 0.5, 3.0)
+        for n in (0.5, 2.0)
     ]
     + [
         Case(

@@ -18,11 +18,16 @@ Array = np.ndarray
 
 def let_go(simulator: Simulator, velocity: Array) -> None:
     """Give the nodes of a scene at its start velocities [m/s], shape (n_node, 3)."""
+    put(simulator, velocity=velocity)
+
+
+def put(simulator: Simulator, **parts: Array) -> None:
+    """Replace parts of the state by their names."""
     state, begin = simulator.save_state(), 0
     for name, shape in simulator.description.state_layout:
         size = int(np.prod(shape))
-        if name == "velocity":
-            state[begin : begin + size] = np.asarray(velocity).ravel()
+        if name in parts:
+            state[begin : begin + size] = np.asarray(parts[name]).ravel()
         begin += size
     simulator.load_state(state)
 

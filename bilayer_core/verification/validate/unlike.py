@@ -28,6 +28,7 @@ LIMIT = 1e-3
 FILM = Section(WIDTH, (1e5, 2.5e9), (1000.0, 1400.0), (4e-3, 12e-6))
 STIFF_TOP = Section(WIDTH, (1e5, 1e6), (1000.0, 1000.0), (3e-3, 1e-3))
 HEAVY_TOP = Section(WIDTH, (1e6, 1e6), (1000.0, 3000.0), (2e-3, 2e-3))
+TEE = Section((WIDTH, 0.2 * WIDTH), (1e6, 1e6), (1000.0, 1000.0), (1e-3, 4e-3))
 DIRECTIONS = {"along": (GRAVITY, 0.0), "against": (-GRAVITY, 0.0), "across": (0.0, -GRAVITY)}
 ALONG, ACROSS = DIRECTIONS["along"], DIRECTIONS["across"]
 
@@ -38,14 +39,16 @@ def scene_of(section: Section, edges: int = EDGES, length: float = LENGTH, held:
         name: {"youngs_modulus": modulus, "poisson_ratio": 0.45, "density": density}
         for name, modulus, density in zip(("first", "second"), section.modulus, section.density, strict=True)
     }
+    own = section.width if isinstance(section.width, tuple) else (None, None)
     layers = [
-        layer(name, thickness, name)
-        for name, thickness in zip(("first", "second"), section.thickness, strict=True)
+        layer(name, thickness, name, width=width)
+        for name, thickness, width in zip(("first", "second"), section.thickness, own, strict=True)
         if thickness
     ]
+    width = None if all(own) else section.width
     clamp = {"clamp_start": "wall"} if held else {}
     solver = {"model": "laminate", "dimension": 2, "integrator": "sdirk2", **more.pop("solver", {})}
-    whole = scene([rod(layers, length, edges + 1, **clamp)], materials=materials, solver=solver, **more)
+    whole = scene([rod(layers, length, edges + 1, width=width, **clamp)], materials=materials, solver=solver, **more)
     return whole | ({"bodies": [fixed()]} if held and "bodies" not in more else {})
 
 
@@ -299,6 +302,8 @@ CASES = [
             ("moduli 1:10, horizontal, down", STIFF_TOP, "across", 1),
             ("moduli 1:10, horizontal, along", STIFF_TOP, "across", 0),
             ("densities 1:3, hanging, aside", HEAVY_TOP, "along", 1),
+            ("widths 5:1, a T, horizontal, down", TEE, "across", 1),
+            ("widths 5:1, a T, horizontal, along", TEE, "across", 0),
         )
     ),
     Case(

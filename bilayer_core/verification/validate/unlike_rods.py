@@ -25,9 +25,11 @@ Force = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class Section:
-    """Two layers of rectangles, the first below the path, the second above it; a thickness may be zero."""
+    """Two layers of rectangles, the first below the path, the second above it; a thickness may be zero, and a pair of
+    widths is that of the layers.
+    """
 
-    width: float
+    width: float | tuple[float, float]
     modulus: tuple[float, float]
     density: tuple[float, float]
     thickness: tuple[float, float]
@@ -38,13 +40,17 @@ class Section:
 
     @property
     def _stretching(self) -> Array:
-        return self.width * np.array(self.modulus) * self.thickness
+        return np.array(self.width) * self.modulus * self.thickness
+
+    @property
+    def _mass_of_layers(self) -> Array:
+        return np.array(self.width) * self.density * self.thickness
 
     @property
     def stiffness(self) -> tuple[float, float, float]:
         """A [N], B [N m], D [N m²]."""
         z, stretching = self._heights, self._stretching
-        own = self.width * np.array(self.modulus) * np.array(self.thickness) ** 3 / 12.0
+        own = np.array(self.width) * self.modulus * np.array(self.thickness) ** 3 / 12.0
         return float(stretching.sum()), float(stretching @ z), float((own + stretching * z**2).sum())
 
     @property
@@ -62,12 +68,12 @@ class Section:
     @property
     def mass(self) -> float:
         """Mass per length [kg/m]."""
-        return float(self.width * np.dot(self.density, self.thickness))
+        return float(np.sum(self._mass_of_layers))
 
     @property
     def centre(self) -> float:
         """Height of the mass centre over the path [m]."""
-        return float(self.width * (np.array(self.density) * self.thickness) @ self._heights / self.mass)
+        return float(self._mass_of_layers @ self._heights / self.mass)
 
     @property
     def middle(self) -> float:
