@@ -115,7 +115,7 @@ class Failure:
 
 @record
 class Attempt:
-    """What a step that pauses has learned from attempts that were rejected, if any were."""
+    """Attempts at a step that paused which were rejected, if any were, and what is next."""
 
     rejected: int = CHANGES
     length: float = CHANGES  # of the next one [s]
