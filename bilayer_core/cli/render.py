@@ -60,9 +60,9 @@ class Size(click.ParamType):
 )
 @click.option(
     "--colour",
-    type=click.Choice(["strain", "curvature", "contact"]),
+    type=click.Choice(["strain", "curvature", "section", "contact"]),
     default="strain",
-    help="What the colours of rods say; contact is the pressure of contact.",
+    help="What the colours of rods say; section is the curvature across strips, contact the pressure of contact.",
 )
 @click.option("--fps", type=click.FloatRange(1.0, 100.0), metavar="N", help=f"Of a film; default {FILM_RATE:g}.")
 @click.option(

@@ -30,8 +30,9 @@ FOLLOWING = ("node", "bind", "port", "serve")
 @click.option("--at", "moment", type=Duration(from_zero=True), help="Time of the picture; default: the end.")
 @click.option(
     "--colour",
-    type=click.Choice(["strain", "curvature", "contact"]),
-    help="What the colours of rods say: axial strain (default), curvature, or the pressure of contact.",
+    type=click.Choice(["strain", "curvature", "section", "contact"]),
+    help="What the colours of rods say: axial strain (default), curvature, that across strips (section), or the "
+    "pressure of contact.",
 )
 @click.option("--force", is_flag=True, help="Replace existing files.")
 def view(file: str | None, follow: bool, **options: Any) -> None:

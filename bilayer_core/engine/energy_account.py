@@ -178,19 +178,15 @@ def _supply_by_jumps(p, state, inputs, work):
         j, strained = drives.driven_joint[k], work.strain[drives.driven_joint_law[k]]
         stage.rest_joint[j, drives.driven_joint_column[k]] += drives.driven_joint_weight[k] * strained
     if p.flattening.exists:
-        pull_of_change(strands, p.flattening, stage.rest_joint)
+        pull_of_change(p, stage.rest_joint)
     for k in range(drives.driven_edge.shape[0]):
         e = drives.driven_edge[k]
         force = strands.axial_stiffness[e] * stage.rest_edge[e] * strands.rest_length[e]
         work.start_force[drives.driven_law[k]] -= drives.driven_weight[k] * force
     for k in range(drives.driven_joint.shape[0]):
         j, column = drives.driven_joint[k], drives.driven_joint_column[k]
-        if p.flattening.exists:
-            pull = p.flattening.pull[j, column]
-            work.start_force[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * pull
-            if j >= p.flattening.first or column != 0:
-                continue
-        moment = strands.joint_stiffness[j, 0] * stage.rest_joint[j, 0]
+        strip = p.flattening.exists and p.flattening.row[j]
+        moment = p.flattening.pull[j, column] if strip else strands.joint_stiffness[j, 0] * stage.rest_joint[j, 0]
         work.start_force[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * moment
     for i in range(work.start_strain.shape[0]):
         done.supplied -= 0.5 * (state.law_force[i] + work.start_force[i]) * work.strain[i]
@@ -243,7 +239,8 @@ def close_step_account(p, state, work, h, beyond, end):
     if account[OPEN] == 0.0:
         open_account(p, state, work.stage, end)
         return NONE
-    write_forces_of_laws(p, end, work.stage, work.end_force)
+    if beyond:  # otherwise `add_powers` has left those of the last stage, which ends there
+        write_forces_of_laws(p, end, work.stage, work.end_force)
     grows, unsure = done.jumped, 0.0
     by_powers, power = done.supplied, account[POWER_SUPPLIED]
     for i in range(work.start_strain.shape[0]):

@@ -39,10 +39,9 @@ def write_forces_of_laws(p, at, stage, force_out):
         pull_of_rest(p, at, stage)
     for k in range(drives.driven_joint.shape[0]):
         j, column = drives.driven_joint[k], drives.driven_joint_column[k]
-        if p.flattening.exists:
+        if p.flattening.exists and p.flattening.row[j]:
             force_out[drives.driven_joint_law[k]] -= drives.driven_joint_weight[k] * p.flattening.pull[j, column]
-            if j >= p.flattening.first or column != 0:
-                continue
+            continue
         a, b = strands.joint_a[j], strands.joint_b[j]
         t, u = row(at.tangent, a), row(at.tangent, b)
         bend = (dot(u, row(at.director1, a)) - dot(t, row(at.director1, b))) / (1.0 + dot(t, u))

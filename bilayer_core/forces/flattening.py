@@ -126,10 +126,11 @@ def strip_law(flattening, rest, i, k, kappa, psi):
 
 @kernel
 def pull_of_rest(p, at, stage):
-    """Write ∂E/∂ of values of `Stage.rest_joint` of strip joints, and the second derivative by κ̄y Δl, at a
-    configuration as it is: of ψ̄ that of all energies, of others that of F.
+    """Write the derivatives of bending, twist and F of strips by values of `Stage.rest_joint`, and the second by κ̄y Δl,
+    at a configuration as it is.
     """
     strands, flattening, rest = p.strands, p.flattening, stage.rest_joint
+    stiffness, pull_out = strands.joint_stiffness, flattening.pull
     for i in range(flattening.joint.shape[0]):
         k, coupling = flattening.joint[i], flattening.coupling[i]
         ka, kb = strands.joint_a[k], strands.joint_b[k]
@@ -142,19 +143,20 @@ def pull_of_rest(p, at, stage):
             psi += TWO_PI * math.floor((at.joint_strain[k, 2] - psi) / TWO_PI + 0.5)
         d1, d3 = kappa - rest[k, 0], psi - rest[k, 2]
         _, _, _, _, _, _, pull, slope = strip_law(flattening, rest, i, k, kappa, psi)
-        flattening.pull[flattening.first + i, 0] = pull
-        flattening.pull[k, 0] = flattening.curl[i] * pull - coupling * d3
-        flattening.pull[k, 2] = flattening.skew[i] * pull - coupling * d1 - strands.joint_stiffness[k, 2] * d3
+        pull_out[flattening.first + i, 0] = pull
+        pull_out[k, 0] = flattening.curl[i] * pull - coupling * d3 - stiffness[k, 0] * d1
+        pull_out[k, 2] = flattening.skew[i] * pull - coupling * d1 - stiffness[k, 2] * d3
         flattening.slope[i] = slope
 
 
 @kernel
-def pull_of_change(strands, flattening, change):
+def pull_of_change(p, change):
     """Replace the derivatives of `pull_of_rest` by what they gain with a change of `Stage.rest_joint`."""
+    stiffness, flattening = p.strands.joint_stiffness, p.flattening
     for i in range(flattening.joint.shape[0]):
         k, j, coupling = flattening.joint[i], flattening.first + i, flattening.coupling[i]
         d1, d3, curl, skew = change[k, 0], change[k, 2], flattening.curl[i], flattening.skew[i]
         pull = flattening.slope[i] * (change[j, 0] + curl * d1 + skew * d3)
         flattening.pull[j, 0] = pull
-        flattening.pull[k, 0] = curl * pull + coupling * d3
-        flattening.pull[k, 2] = skew * pull + coupling * d1 + strands.joint_stiffness[k, 2] * d3
+        flattening.pull[k, 0] = curl * pull + coupling * d3 + stiffness[k, 0] * d1
+        flattening.pull[k, 2] = skew * pull + coupling * d1 + stiffness[k, 2] * d3

@@ -31,6 +31,7 @@ from bilayer_core.forces.bend_twist import bend_by_strains
 from bilayer_core.forces.elements import acts_viscously
 from bilayer_core.forces.flattening import strip_law
 from bilayer_core.jit import kernel, piece
+from bilayer_core.jit.kernel import Kernel
 from bilayer_core.jit.piece import Piece
 from bilayer_core.model.force_slots import slot_of
 from bilayer_core.model.records.parts import Plane
@@ -71,38 +72,56 @@ def planar_stretch(plane, strands, at, stage, with_hessian):
     return energy
 
 
-@kernel
-def planar_bend(first, last, rest, plane, strands, stage, at, with_hessian):
-    """Add ½ k (κ − κ̄)² of joints first … last − 1 and return it, of bends and of bonds [J].
+def _planar_bend(strips: bool) -> Kernel:
+    """Return the kernel for rods with strips among them, or without."""
 
-    `rest` has κ̄ [rad] in its first column. Of the strains in `at` κ alone is written; the others vanish in the plane.
-    """
-    edge_a, edge_b, stiffness, strain_out = strands.joint_a, strands.joint_b, stage.joint_stiffness, at.joint_strain
-    side, frame, gradient = plane.side, plane.frame, plane.polar_gradient
-    hessian, cross_hessian = plane.polar_hessian, plane.cross_hessian
-    bending = bond = 0.0
-    for k in range(first, last):
-        a, b = edge_a[k], edge_b[k]
-        ap, aq, bp, bq = frame[a, 0], frame[a, 1], frame[b, 0], frame[b, 1]
-        inverse = 1.0 / (1.0 + ap * bp + aq * bq)
-        slope = 2.0 * side[a] * inverse
-        kappa = slope * (ap * bq - aq * bp)
-        strain_out[k, 0] = kappa
-        difference = kappa - rest[k, 0]
-        force = stiffness[k, 0] * difference
-        if k < strands.bend_count:
-            bending += 0.5 * force * difference
-        else:
-            bond += 0.5 * force * difference
-        moment = force * slope
-        gradient[a, 1] -= moment
-        gradient[b, 1] += moment
-        if with_hessian:
-            second = stiffness[k, 0] * slope * slope + force * kappa * inverse
-            hessian[a, 2] += second
-            hessian[b, 2] += second
-            cross_hessian[k, 3] -= second
-    return bending, bond
+    @kernel
+    def planar_bend(first, last, rest, plane, p, stage, at, with_hessian):
+        """Add ½ k (κ − κ̄)² of joints first … last − 1 and return it, of bends and of bonds [J]; of strips add F.
+
+        `rest` has κ̄ [rad] in its first column. Of strains in `at` κ alone is written; the others vanish in the plane.
+        """
+        strands = p.strands
+        edge_a, edge_b, stiffness, strain_out = strands.joint_a, strands.joint_b, stage.joint_stiffness, at.joint_strain
+        side, frame, gradient = plane.side, plane.frame, plane.polar_gradient
+        hessian, cross_hessian = plane.polar_hessian, plane.cross_hessian
+        bending = bond = 0.0
+        if strips:
+            flattening, strip, flattened = p.flattening, 0, 0.0
+            flattens = p.sums.selected[FLATTENING]
+        for k in range(first, last):
+            a, b = edge_a[k], edge_b[k]
+            ap, aq, bp, bq = frame[a, 0], frame[a, 1], frame[b, 0], frame[b, 1]
+            inverse = 1.0 / (1.0 + ap * bp + aq * bq)
+            slope = 2.0 * side[a] * inverse
+            kappa = slope * (ap * bq - aq * bp)
+            strain_out[k, 0] = kappa
+            difference = kappa - rest[k, 0]
+            force = stiffness[k, 0] * difference
+            if k < strands.bend_count:
+                bending += 0.5 * force * difference
+            else:
+                bond += 0.5 * force * difference
+            if strips:
+                k11 = 0.0
+                if flattens and strip < flattening.joint.shape[0] and flattening.joint[strip] == k:
+                    energy, f1, _, k11, _, _, _, _ = strip_law(flattening, stage.rest_joint, strip, k, kappa, 0.0)
+                    strip, flattened, force = strip + 1, flattened + energy, force + f1
+            moment = force * slope
+            gradient[a, 1] -= moment
+            gradient[b, 1] += moment
+            if with_hessian:
+                second = stiffness[k, 0] * slope * slope + force * kappa * inverse
+                if strips:
+                    second += k11 * slope * slope
+                hessian[a, 2] += second
+                hessian[b, 2] += second
+                cross_hessian[k, 3] -= second
+        if strips:
+            p.sums.energy[FLATTENING] = flattened
+        return bending, bond
+
+    return planar_bend
 
 
 @kernel
@@ -187,30 +206,9 @@ def planar_bond(ties, bends, bonds, plane, strands, stage, at, sums, with_hessia
     return bond, bending
 
 
-@kernel
-def planar_flattening(flattening, plane, strands, stage, at, with_hessian):
-    """Add F of strips, whose κ is in `at` by now, and return it [J]: ∂κ/∂Δ = σ (1 + κ²/4)."""
-    gradient, hessian, cross_hessian = plane.polar_gradient, plane.polar_hessian, plane.cross_hessian
-    flattened = 0.0
-    for i in range(flattening.joint.shape[0]):
-        k = flattening.joint[i]
-        a, b, kappa = strands.joint_a[k], strands.joint_b[k], at.joint_strain[k, 0]
-        energy, force, _, tangent, _, _, _, _ = strip_law(flattening, stage.rest_joint, i, k, kappa, 0.0)
-        flattened += energy
-        turn = 1.0 + 0.25 * kappa * kappa
-        moment = force * plane.side[a] * turn
-        gradient[a, 1] -= moment
-        gradient[b, 1] += moment
-        if with_hessian:
-            second = (tangent * turn + 0.5 * force * kappa) * turn
-            hessian[a, 2] += second
-            hessian[b, 2] += second
-            cross_hessian[k, 3] -= second
-    return flattened
-
-
 def _add_elasticity(strips: bool) -> Piece:
     """Return the piece for rods with strips among them, or without."""
+    planar_bend = _planar_bend(strips)
 
     def add_elasticity(plane, p, at, stage, with_hessian):
         """Add stretching, bending and bonds; first derivatives by edges and pairs in space, second ones by l, φ, p."""
@@ -228,9 +226,7 @@ def _add_elasticity(strips: bool) -> Piece:
             bend_by_strains(off_axis, strands, at, rest)
             rest = off_axis.rest
         first, last = 0 if bends else strands.bend_count, strands.joint_a.shape[0] if ties else strands.bend_count
-        sums.energy[BENDING], rotation = planar_bend(first, last, rest, plane, strands, stage, at, with_hessian)
-        if strips and sums.selected[FLATTENING]:
-            sums.energy[FLATTENING] = planar_flattening(p.flattening, plane, strands, stage, at, with_hessian)
+        sums.energy[BENDING], rotation = planar_bend(first, last, rest, plane, p, stage, at, with_hessian)
         if bends and off_axis.exists:
             planar_stretch_bend(off_axis, plane, strands, stage, at, with_hessian)
         if bonds.exists:

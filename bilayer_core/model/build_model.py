@@ -207,10 +207,13 @@ def _flattening(found: Collected, rods: Strands) -> Flattening:
     width, length = 2.0 * rods.half_width[edges].mean(axis=1), found.column("voronoi_length")[joint]
     bending, offset = rods.joint_stiffness[joint, 0], found.column("strip_offset")
     membrane = found.column("strip_membrane") * rods.axial_stiffness[edges].mean(axis=1)
+    row = np.ones(len(rods.joint_a) + len(joint), dtype=bool)
+    row[np.setdiff1d(np.arange(len(rods.joint_a)), joint)] = False
     return Flattening.zeros(
         UNALLOCATED,
         first=len(rods.joint_a),
         joint=joint,
+        row=row,
         stiffness=0.25 * (1.0 - offset**2) * width**4 * membrane / length**3,
         scale=0.5 * width**2 * np.sqrt(membrane / (found.column("strip_plate") * bending * length**3)),
         coupling=found.column("strip_coupling") * bending,

@@ -90,7 +90,8 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
     plate = plate_of(scene, rod)
     whole = WholeSection(scene, rod, parts, cells, shape, plate)
     low, high = _faces(rod, axis)
-    strands = _strands(found, copies, axis, shape, (low, high))
+    strip = section_of(scene, rod) == "strip"
+    strands = _strands(found, copies, axis, shape, (low, high), strip)
     mass, centre = sum(layer.mass for layer in layers), _mass_centre(rod, layers, axis)
     elements = StrandElements(
         edge_mass=mass,
@@ -117,7 +118,7 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
     found.rods += [[(0, int(nodes[-1]), strand.first_node, strand.first_edge)] for strand in strands]
     found.path_height += [path] * len(copies)
     joints = add_strands(found, scene, rod, strands, shape, elements, body_index)
-    if section_of(scene, rod) == "strip":
+    if strip:
         _add_strip_joints(found, scene.materials[rod.layers[0].material].poisson_ratio, plate, joints, shape)
     coupling = whole.strain_coupling()
     coupled = coupling.any(axis=-1) & (joints >= 0)
@@ -152,7 +153,7 @@ def _add_strip_joints(
 
 
 def _strands(
-    found: Collected, copies: list[RodCopy], axis: float, shape: StrandShape, faces: tuple[Array, Array]
+    found: Collected, copies: list[RodCopy], axis: float, shape: StrandShape, faces: tuple[Array, Array], strip: bool
 ) -> list[StrandArrays]:
     """Return the strand of each copy; `faces` are heights of the two faces over the curve [m]."""
     rod, (low, high) = copies[0].rod, faces
@@ -178,6 +179,7 @@ def _strands(
                 curvature=curvature,
                 closed=shape.closed,
                 round=rod.radius is not None,
+                strip=strip,
                 layers=drawn,
             )
         )

@@ -36,6 +36,7 @@ class StrandArrays(ReadOnlyArrays):
     curvature: Array  # of its nodes' curve at the start [1/m], likewise
     closed: bool = False  # whether its last two nodes, and its last edge, are copies of the first
     round: bool = False  # whether its sections are
+    strip: bool = False  # whether its sections bend
     layers: tuple[StrandArrays, ...] = ()  # of a strand that stands for several: each on those nodes where it is
 
     @property

@@ -39,6 +39,8 @@ class Strand:
         Whether it has no ends: its first and its last node are one, and all that they have is the same.
     round : bool
         Whether its sections are round, as wide as thick.
+    strip : bool
+        Whether its sections bend, see `Frame.section_curvature`.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Strand:
     layers: tuple[Strand, ...] = ()
     closed: bool = False
     round: bool = False
+    strip: bool = False
 
     def __repr__(self) -> str:
         parts = f", layers {', '.join(part.layer for part in self.layers)}" if self.layers else ""
@@ -207,6 +210,8 @@ class Frame:
         Axial strain at every node (mean of its edges), eigenstrain included, shape (node_count,).
     curvature : ndarray
         Curvature through the thickness, χ = m1·t′, at every node [1/m], shape (node_count,).
+    section_curvature : ndarray
+        Mean curvature across the width at every node of strips [1/m], 0 at others, shape (node_count,).
     contact_forces : ndarray
         Barrier and friction force on every node [N], shape (node_count, 3).
     body_positions, body_quaternions : ndarray
@@ -251,6 +256,7 @@ class Frame:
     directors: np.ndarray
     strain: np.ndarray
     curvature: np.ndarray
+    section_curvature: np.ndarray
     contact_forces: np.ndarray
     body_positions: np.ndarray
     body_quaternions: np.ndarray

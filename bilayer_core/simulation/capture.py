@@ -6,12 +6,15 @@ from collections.abc import Callable
 from dataclasses import fields
 from typing import Any
 
+import numpy as np
+
 from bilayer_core.model.state import State, sealed
 from bilayer_core.observed.frame import Frame
 from bilayer_core.simulation.observation import energies, positions_with_points, velocities_with_points
 from bilayer_core.simulation.parts import Parts
 from bilayer_core.simulation.statistics import RunStatistics, center_of_mass
 from bilayer_core.simulation.stepper import Stepper
+from bilayer_core.simulation.strip_sections import across_at_nodes
 
 
 class Capture:
@@ -31,6 +34,7 @@ _DERIVED: dict[str, Callable[[Capture], Any]] = {
     "directors": lambda of: of.state.director1,
     "strain": lambda of: of.seen.strain,
     "curvature": lambda of: of.seen.curvature,
+    "section_curvature": lambda of: np.append(across_at_nodes(of.model, of.state), np.zeros(of.model.point_count)),
     "contact_forces": lambda of: of.seen.contact_force,
     "body_positions": lambda of: of.state.body_position,
     "body_quaternions": lambda of: of.seen.quaternion,

@@ -74,6 +74,7 @@ def strand(s: StrandArrays) -> Strand:
         tuple(map(strand, s.layers)),
         s.closed,
         s.round,
+        s.strip,
     )
 
 

@@ -1,4 +1,4 @@
-"""Colours of rods by axial strain, curvature, or the pressure of contact."""
+"""Colours of rods by axial strain, curvature, along or across, or the pressure of contact."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from bilayer_core.log.run.run_data import RunData
 from bilayer_core.observed.frame import Strand
 from bilayer_core.view.scales import rounded_up
 
-STRAIN, CURVATURE, CONTACT = "strain", "curvature", "contact"
-QUANTITIES = (STRAIN, CURVATURE, CONTACT)
-SMALLEST = {STRAIN: 1e-4, CURVATURE: 1e-6, CONTACT: 1e-6}
+STRAIN, CURVATURE, SECTION, CONTACT = "strain", "curvature", "section", "contact"
+QUANTITIES = (STRAIN, CURVATURE, SECTION, CONTACT)
+SMALLEST = {STRAIN: 1e-4, CURVATURE: 1e-6, SECTION: 1e-6, CONTACT: 1e-6}
 """Of the fullest colours [1, 1/m, Pa], for a run in which nothing happens; of curvature, by the size of the robot."""
 PRESSURE_SHARE = 99.0
 """Percentile of the pressures above zero that has the fullest colour: an impact would leave no colour to the rest."""
@@ -82,7 +82,7 @@ def choose_colouring(run: RunData, quantity: str = STRAIN) -> Colouring:
     found = np.concatenate([np.abs(_values(run, layer, quantity)).ravel() for layer in run.description.layers])
     found = found[np.isfinite(found)]
     least = SMALLEST[quantity]
-    if quantity == CURVATURE:
+    if quantity in (CURVATURE, SECTION):
         least /= max(float(np.ptp(run.positions[0], axis=0).max()), 1e-9)
     largest = float(found.max(initial=0.0))
     if quantity == CONTACT:
@@ -96,9 +96,9 @@ def colouring_up_to(quantity: str, limit: float, exceeded: bool = False) -> Colo
     """Return the colours with a given limit, in SI units."""
     if quantity == STRAIN:
         title, shown = "axial strain [%]", f"{100 * limit:.4g}"
-    elif quantity == CURVATURE:
-        per_mm = limit >= 1e3
-        title, shown = f"curvature [1/{'mm' if per_mm else 'm'}]", f"{limit / (1e3 if per_mm else 1.0):.4g}"
+    elif quantity in (CURVATURE, SECTION):
+        per_mm, across = limit >= 1e3, " across" if quantity == SECTION else ""
+        title, shown = f"curvature{across} [1/{'mm' if per_mm else 'm'}]", f"{limit / (1e3 if per_mm else 1.0):.4g}"
     else:
         scale, prefix = next((p for p in _PREFIXES if limit >= p[0]), _PREFIXES[-1])
         title, shown = f"contact pressure [{prefix}Pa]", f"{limit / scale:.4g}"
@@ -108,8 +108,8 @@ def colouring_up_to(quantity: str, limit: float, exceeded: bool = False) -> Colo
 def _values(run: RunData, layer: Strand, quantity: str) -> np.ndarray:
     if quantity == STRAIN:
         return run.strain_of(layer)
-    if quantity == CURVATURE:
-        return run.curvature[:, layer.nodes]
+    if quantity in (CURVATURE, SECTION):
+        return (run.curvature if quantity == CURVATURE else run.section_curvature)[:, layer.nodes]
     return contact_pressure(run, layer)
 
 

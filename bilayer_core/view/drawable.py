@@ -8,7 +8,8 @@ from bilayer_core.observed.frame import Strand
 
 DRAWN = ("body_pose", "nodes", "points")
 """Topics without which there is nothing to draw."""
-PLACED = ("positions", "contact_forces", "strain", "curvature", "material_frames", "body_positions", "body_quaternions")
+PLACED = ("positions", "contact_forces", "strain", "curvature", "section_curvature", "material_frames")
+PLACED += ("body_positions", "body_quaternions")
 """Attributes of a run that decide where things are drawn, and how large."""
 LARGEST = 1e12
 """Of their values, in SI units."""

@@ -8,14 +8,17 @@ import pytest
 from support.evaluations import Problem, at_rest, check
 from support.sample_scenes import GEL, fixed, layer, rod, scene
 
-from bilayer_core import Simulator, load_scene
+from bilayer_core import Simulator, load_scene, read_log
 from bilayer_core.errors import SceneError, SimulationError
 from bilayer_core.forces.flattening import SERIES, flatness
 from bilayer_core.jit import UNALLOCATED
 from bilayer_core.kinematics.rotation import rotation_matrix
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run.memory import MemoryRecorder
 from bilayer_core.model.build_model import build_model
 from bilayer_core.model.plate_strip import flattening_series
 from bilayer_core.simulation.strip_sections import folded
+from bilayer_core.view.colouring import choose_colouring
 
 TABLE = {
     0.3: {0.5: 0.997, 1.0: 0.989, 2.6: 0.941, 3.0: 0.927, 4.3: 0.888, 6.0: 0.863, 10.0: 0.974, 20.0: 1.141}
@@ -322,3 +325,21 @@ def test_the_work_of_a_stimulus_that_twists_a_strip_is_what_it_gains(monkeypatch
     simulator.run(0.01)
     assert np.abs(simulator._state.twist).max() > 1e-3
     assert abs(simulator.summary()["numerical_energy"]) < 1e-3 * simulator.summary()["largest_energy"]
+
+
+def test_logs_of_strips_hold_their_section_curvature_and_pictures_can_show_it(tmp_path):
+    simulator, held = Simulator(load_scene(wide()), model="laminate"), MemoryRecorder()
+    simulator.run(0.1, observers=[McapRecorder(tmp_path / "run.mcap"), held])
+    wanted = simulator.rods["rod"].section_curvature
+    logged, name = read_log(tmp_path / "run.mcap"), "rod/rod/laminate/section_curvature"
+    assert np.abs(wanted).max() > 1.0
+    for run in (logged, held.run_data()):
+        assert run.quantities[name].values[-1] == pytest.approx(wanted, rel=1e-6)
+        colours = choose_colouring(run, "section")
+        assert colours.title == "curvature across [1/m]"
+        assert colours.values(run, run.description.strands[0])[-1] == pytest.approx(wanted, rel=1e-6)
+    beam = Simulator(load_scene(wide(section="beam")), model="laminate")
+    held = MemoryRecorder()
+    beam.run(0.1, observers=[held])
+    assert name not in held.run_data().quantities
+    assert (held.run_data().section_curvature == 0.0).all()

@@ -86,6 +86,7 @@ class StrandPart(Part):
     layers: Annotated[tuple[LayerPart, ...], Field(max_length=MOST_PARTS)] = ()
     closed: StrictBool = False
     round: StrictBool = False
+    strip: StrictBool = False
 
     @model_validator(mode="after")
     def _check_sizes(self) -> Self:

@@ -14,12 +14,13 @@ from bilayer_core.log.messages.cdr import SEPARATOR, Template, read_float64_mult
 from bilayer_core.log.messages.markers import MarkerEncoder
 from bilayer_core.log.messages.node_frames import NodeFrames
 from bilayer_core.log.messages.tf_frames import TfEncoder
-from bilayer_core.log.messages.topics import FRAME_ID, MARKERS, TF, output_topics
+from bilayer_core.log.messages.topics import FRAME_ID, MARKERS, SECTION_POINTS, TF, output_topics
 from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.observed.inputs import LOAD, SIZES, STIMULUS, Input
 from bilayer_core.printable import shortened
 
 POINT_FIELDS = ("x", "y", "z", "strain", "curvature", "fx", "fy", "fz")
+SECTION_FIELDS = ("x", "y", "z", "curvature")
 SOLVER_LABELS = ("iterations", "residual", "substeps", "min_gap", "cpu_time")
 _FLOAT32_FIELD = 7  # sensor_msgs/PointField.FLOAT32
 
@@ -159,6 +160,10 @@ class FrameEncoder:
             "points": SmallMessage(
                 point_cloud_template(description.node_count),
                 lambda frame: np.column_stack([frame.positions, frame.strain, frame.curvature, frame.contact_forces]),
+            ),
+            SECTION_POINTS.name: SmallMessage(
+                point_cloud_template(description.node_count, SECTION_FIELDS),
+                lambda frame: np.column_stack([frame.positions, frame.section_curvature]),
             ),
             MARKERS: self._markers.encode,
         }

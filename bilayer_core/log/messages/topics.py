@@ -84,6 +84,9 @@ itself. They come with every frame: who looks one up by the stamp of a pose, a w
 """
 
 
+SECTION_POINTS = TopicSpec("section_points", "sensor_msgs/msg/PointCloud2", Rate.DISPLAY)
+
+
 def output_topics(description: Description, tf: bool = False) -> tuple[TopicSpec, ...]:
     """Return all topics that a run of this model sends, with `TF` if that is asked for.
 
@@ -100,6 +103,8 @@ def output_topics(description: Description, tf: bool = False) -> tuple[TopicSpec
     ``nodes``                        pose of every node, strand by strand; the axes x, y, z of a pose are the material
                                      frame: m1 (through the thickness), m2 (along the width), m3 (tangent)
     ``points``                       x y z strain curvature fx fy fz of the same nodes, then of contact points of bodies
+    ``section_points``               x y z curvature of the same points: that across the width [1/m], 0 at those of
+                                     beams; where a rod is a strip
     ``markers``                      layers coloured by their strain, bodies, obstacles, contact forces; the first array
                                      of a log deletes all markers that a viewer has
     ================================ ==================================================================================
@@ -125,6 +130,7 @@ def output_topics(description: Description, tf: bool = False) -> tuple[TopicSpec
         *((TF,) if tf else ()),
         TopicSpec("nodes", "geometry_msgs/msg/PoseArray", display),
         TopicSpec("points", "sensor_msgs/msg/PointCloud2", display),
+        *((SECTION_POINTS,) if any(strand.strip for strand in description.strands) else ()),
         TopicSpec(MARKERS, "visualization_msgs/msg/MarkerArray", display),
     )
 

@@ -17,7 +17,7 @@ from bilayer_core.log.messages.cdr import NANOSECONDS, Template, decoded, read_f
 from bilayer_core.log.messages.event_messages import decode_event
 from bilayer_core.log.messages.events import Event
 from bilayer_core.log.messages.node_frames import node_order
-from bilayer_core.log.messages.topics import EVENTS, Rate, output_topics
+from bilayer_core.log.messages.topics import EVENTS, SECTION_POINTS, Rate, output_topics
 from bilayer_core.log.run.bag import split_address
 from bilayer_core.log.run.opened_run import MessageSource, open_run
 from bilayer_core.log.run.quantities import Entry, Quantity, entries
@@ -259,16 +259,20 @@ class LogSource:
             "points": np.full((count, nodes, len(encoders.POINT_FIELDS)), np.nan, np.float32),
             "nodes": np.full((count, len(node_order(self.description)), 7), np.nan, np.float32),
         }
+        if SECTION_POINTS.name in self._topics:
+            self._take_memory(4 * count * nodes * len(encoders.SECTION_FIELDS))
+            whole[SECTION_POINTS.name] = np.full((count, nodes, len(encoders.SECTION_FIELDS)), np.nan, np.float32)
         held = [Entry(topic, "", "", (), topic, (), ("node",)) for topic in whole if topic in self._topics]
         for rows, block in self.blocks(held):
             for name, values in block.items():
                 whole[name][rows] = values
-        points = whole["points"]
+        points, flat = whole["points"], np.broadcast_to(np.zeros(4, np.float32), (count, nodes, 4))
         return {
             "positions": points[..., :3],
             "contact_forces": points[..., 5:],
             "strain": points[..., 3],
             "curvature": points[..., 4],
+            "section_curvature": whole.get(SECTION_POINTS.name, flat)[..., 3],
             "material_frames": whole["nodes"][..., 3:],
         }
 
@@ -316,10 +320,12 @@ class LogSource:
             return encoders.pose_array_template(len(node_order(self.description))), "poses"
         if kind == "points":
             return encoders.point_cloud_template(self.description.node_count), "points"
+        if kind == SECTION_POINTS.name:
+            return encoders.point_cloud_template(self.description.node_count, encoders.SECTION_FIELDS), "points"
         return encoders.stamped_template({"com": 3, "body_pose": 7}.get(kind, 6)), "data"
 
 
-_OF_SHAPES = ("positions", "contact_forces", "material_frames", "strain", "curvature")
+_OF_SHAPES = ("positions", "contact_forces", "material_frames", "strain", "curvature", "section_curvature")
 
 
 def size_of(path: Path) -> float:

@@ -68,5 +68,6 @@ class MemoryRecorder:
             material_frames=np.array([material_frames(frame) for frame in frames]),
             strain=stack("strain", np.float32),
             curvature=stack("curvature", np.float32),
+            section_curvature=stack("section_curvature", np.float32),
             events=(*events, *detector.end(frames[-1].time)),
         )

@@ -1,22 +1,23 @@
 """A run as named arrays over time, with units: to look up, to hand to pandas or xarray, to compare.
 
-================================= ============================== ======================================================
-name                              axes after time                is
-================================= ============================== ======================================================
-``stimulus/<channel>``                                           what acted, in the unit of the channel
-``energy/<term>``                                                energy of a term [J]
-``solver/<figure>``                                              iterations, residual, substeps, min_gap, cpu_time
-``com``                           axis                           mass centre of the robot [m]
-``body/<body>/position``          axis                           [m]
-``body/<body>/quaternion``        part                           x y z w
-``body/<body>/contact_wrench``    part                           force [N] and moment [N m] of contact
-``body/<body>/clamp_wrench``      part                           of the rods that it holds
-``rod/<strand>/position``         node, axis                     [m]
-``rod/<strand>/contact_force``    node, axis                     [N]
-``rod/<strand>/frame``            node, part                     quaternion x y z w of the axes m1 m2 m3
-``rod/<strand>/strain``           node                           axial
-``rod/<strand>/curvature``        node                           through the thickness [1/m]
-================================= ============================== ======================================================
+================================== ============================== =====================================================
+name                               axes after time                is
+================================== ============================== =====================================================
+``stimulus/<channel>``                                            what acted, in the unit of the channel
+``energy/<term>``                                                 energy of a term [J]
+``solver/<figure>``                                               iterations, residual, substeps, min_gap, cpu_time
+``com``                            axis                           mass centre of the robot [m]
+``body/<body>/position``           axis                           [m]
+``body/<body>/quaternion``         part                           x y z w
+``body/<body>/contact_wrench``     part                           force [N] and moment [N m] of contact
+``body/<body>/clamp_wrench``       part                           of the rods that it holds
+``rod/<strand>/position``          node, axis                     [m]
+``rod/<strand>/contact_force``     node, axis                     [N]
+``rod/<strand>/frame``             node, part                     quaternion x y z w of the axes m1 m2 m3
+``rod/<strand>/strain``            node                           axial
+``rod/<strand>/curvature``         node                           through the thickness [1/m]
+``rod/<strand>/section_curvature`` node                           of a strip across its width, in the mean [1/m]
+================================== ============================== =====================================================
 
 A strand is ``<rod>/<layer>``. What stands under ``rod/`` comes at the rate of markers, all else at that of frames.
 """
@@ -32,6 +33,7 @@ import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.log.messages.node_frames import node_order
+from bilayer_core.log.messages.topics import SECTION_POINTS
 from bilayer_core.observed.frame import Description
 
 Array = np.ndarray
@@ -179,6 +181,9 @@ def entries(description: Description, terms: Iterable[str], figures: Iterable[st
         yield Entry(f"{of}/frame", "", "material_frames", (frames,), "nodes", (frames, slice(3, 7)), *of_part)
         yield Entry(f"{of}/strain", "", "strain", (nodes,), "points", (nodes, 3), ("node",))
         yield Entry(f"{of}/curvature", "1/m", "curvature", (nodes,), "points", (nodes, 4), ("node",))
+        if strand.strip:
+            across = f"{of}/section_curvature"
+            yield Entry(across, "1/m", "section_curvature", (nodes,), SECTION_POINTS.name, (nodes, 3), ("node",))
 
 
 def quantities_of(run: Run) -> Iterator[Quantity]:

@@ -43,6 +43,8 @@ class RunData(Recorded):
         Unit quaternions x y z w of the axes m1 m2 m3 at the nodes of strands, shape (shapes, strand nodes, 4), float32.
     strain, curvature : ndarray
         Of every node [1, 1/m], shape (shapes, node_count), float32.
+    section_curvature : ndarray
+        Across strips at every node [1/m], 0 at those of beams, shape (shapes, node_count), float32.
     events : tuple of Event
         What happened, in the order of time; empty for older logs.
     """
@@ -63,6 +65,7 @@ class RunData(Recorded):
     material_frames: np.ndarray
     strain: np.ndarray
     curvature: np.ndarray
+    section_curvature: np.ndarray
     events: tuple[Event, ...] = field(default_factory=tuple)
 
     @cached_property

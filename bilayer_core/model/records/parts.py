@@ -107,6 +107,7 @@ class Flattening:
 
     first: int  # row of `Stage.rest_joint` with κ̄y Δl of the first of them, those of others follow
     joint: Indices  # in order, shape (n_strip_joint,)
+    row: Flags  # whether a row of `Stage.rest_joint` is of a strip, shape (n_joint + n_strip_joint,)
     stiffness: Vector  # s [N m], likewise
     scale: Vector  # √Λ, likewise
     curl: Vector  # a₁, likewise
