@@ -23,6 +23,7 @@ BUNDLED = {
     "gripping": (3, "rods.arm_1 leaves the plane y = 0"),
     "gripping_friction": (3, "rods.arm_1 leaves the plane y = 0"),
     "helical_ribbon": (3, "rods.ribbon.layers.lower.fibres turn the rod out of the plane y = 0"),
+    "heated_finger": (2, "all stays in the plane y = 0"),
     "helix": (3, "rods.strip.layers.helical.natural_twist turns the rod out of the plane y = 0"),
     "jumping": (2, "all stays in the plane y = 0"),
     "knot": (3, "rods.thread leaves the plane with normal (0.0703485, -0.997522, 0) through (-0.15, 0, -0.012) m"),
