@@ -72,6 +72,11 @@ def test_isotropic_layers_of_one_ratio_have_the_section_of_a_beam():
     assert found.plate == pytest.approx(found.narrow[0] / (1.0 - 0.4**2), rel=1e-12)
 
 
+def test_a_layer_that_swells_more_towards_one_face_bends_away_from_it_in_all_directions():
+    one = section_of(None, thickness=(0.1e-3,), materials=LIKE[:1]).natural(0, gradient=True)
+    assert (one.strain, one.along, one.across, one.twist) == pytest.approx((0.0, -1e4, -1e4, 0.0), abs=1e-8)
+
+
 GAIN, STEP = 1e-5, 2e-2
 """Eigenstrain and curvature [1/m] of narrow strips: w²κ/H is 0.05."""
 PLATES = {
