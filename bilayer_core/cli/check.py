@@ -49,7 +49,7 @@ def _report(simulator) -> dict[str, Any]:
     from bilayer_core.runs.forecast import forecast
 
     scene, plan, model = simulator.scene, simulator.plan, simulator.model
-    figures = (*validity_figures(scene), *twist_figures(scene, plan.model, plan.dimension))
+    figures = (*validity_figures(scene, plan.model), *twist_figures(scene, plan.model, plan.dimension))
     size = forecast(simulator)
     rates = {Rate.OUTPUT: scene.output.rate, Rate.DISPLAY: min(scene.output.rate, scene.output.marker_rate)}
     return {

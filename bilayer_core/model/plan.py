@@ -80,7 +80,7 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
     if chosen_model == "laminate":
         _refuse_laminate(scene)
     for rod in scene.rods:
-        if section_of(scene, rod) == "strip":
+        if section_of(scene, rod, chosen_model) == "strip":
             _refuse_strip(scene, rod, chosen_model)
     asked = _choose("dimension", dimension, solver.dimension, DIMENSIONS)
     if asked is not None and asked[0] == 2:
@@ -111,7 +111,7 @@ def make_plan(scene: SceneConfig, *, model="auto", dimension="auto", integrator=
         told(
             [
                 *implausible_numbers(scene),
-                *validity_warnings(scene),
+                *validity_warnings(scene, chosen_model),
                 *passing_warnings(scene),
                 *_warnings_of(scene, chosen_model, chosen_dimension),
                 *advice(scene),
@@ -137,17 +137,21 @@ def simplest_model(scene: SceneConfig) -> tuple[str, str]:
     if scene.coupling != Coupling():
         return "two_rod", "`coupling` is set: only the two-rod model has a bond that gives"
     for rod in scene.rods:
-        if section_of(scene, rod) == "strip":
-            return "laminate", f"rods.{rod.name}: its section bends (`section: {rod.section}`), which two rods cannot"
+        if rod.section == "strip" or rod.feels_across:
+            return "laminate", f"rods.{rod.name}: its section bends (`section: strip`), which two rods cannot"
+    for rod in scene.rods:
         if len(_retardation_times(rod, scene)) > 1:
             return "two_rod", f"rods.{rod.name}: layers with different retardation times, of which a curve has one"
         if _moves_its_axis(rod):
             return "two_rod", f"rods.{rod.name}: layers whose moduli change unlike each other, which moves their axis"
         error = helix_error(scene, rod)
-        if error > HELIX:
+        if error > HELIX and section_of(scene, rod) == "beam":
             return "two_rod", (
                 f"rods.{rod.name}: it winds to a helix, which one curve would miss by {100 * error:.2g} %"
             )
+    for rod in scene.rods:
+        if section_of(scene, rod) == "strip":
+            return "laminate", f"rods.{rod.name}: its section bends (`section: {rod.section}`), which two rods cannot"
     return "laminate", "one curve carries both layers: half the unknowns, no stiff bond"
 
 

@@ -108,7 +108,7 @@ class PlateSection:
     bending : ndarray
         D* [N m], shape (3, 3).
     growth : tuple of float
-        Ẽ, k₁ and k₃ over those of a beam of the layers without fibres.
+        Ẽ, k₁, k₃ and κ̄_x over those of a beam of the layers without fibres.
     pulled : float
         Coupling of a pull along the strip with twist, as a part of √(EA GJ).
     """
@@ -133,9 +133,9 @@ class PlateSection:
         self.bending = np.linalg.inv(flexible[3:, 3:])
         self.growth = self._growth(scene)
 
-    def _growth(self, scene: SceneConfig) -> tuple[float, float, float]:
-        """Return Ẽ, k₁ and k₃ over those of a beam of the layers without fibres: Σ E h, Σ E (h (z − z₀)² + h³/12) and
-        4 Σ G (h (z − z_G)² + h³/12), z₀ the height of the curve.
+    def _growth(self, scene: SceneConfig) -> tuple[float, float, float, float]:
+        """Return Ẽ, k₁, k₃ and κ̄_x over those of a beam of the layers without fibres: Σ E h, Σ E (h (z − z₀)² + h³/12),
+        4 Σ G (h (z − z_G)² + h³/12), z₀ the height of the curve, and Timoshenko's curvature.
         """
         materials = [scene.materials[layer.material] for layer in self._layers]
         own = list(zip(map(_modulus, self._layers, materials), self._thickness, self._height, strict=True))
@@ -146,7 +146,11 @@ class PlateSection:
             for parts, centre in ((own, self.axis), (shear, middle))
         )
         along, _, twist = self.narrow
-        return self.stretch / sum(e * h for e, h, _ in own), along / bending, twist / (4.0 * twisting)
+        stretching, (last, thick, high) = sum(e * h for e, h, _ in own), own[-1]
+        axis = sum(e * h * z for e, h, z in own) / stretching
+        curvature = last * thick * (axis - high) / sum(e * (h * (z - axis) ** 2 + h**3 / 12.0) for e, h, z in own)
+        curl = self.natural(len(own) - 1).along / curvature if curvature else 1.0
+        return self.stretch / stretching, along / bending, twist / (4.0 * twisting), curl
 
     @property
     def narrow(self) -> tuple[float, float, float]:

@@ -12,7 +12,7 @@ from bilayer_core.model.edge_figures import EdgeFigures, edge_figures
 from bilayer_core.model.findings import Figure
 from bilayer_core.model.plate_section import PlateSection, is_plate, plate_section
 from bilayer_core.model.plate_strip import curved_stiffness, folds, swollen_curvature, swollen_curvature_across
-from bilayer_core.scene.config import Coupling, SceneConfig
+from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.diffusion_modes import strain_at
 from bilayer_core.scene.profile import Profile
 from bilayer_core.scene.rod import Rod
@@ -21,6 +21,8 @@ MOST = 0.01
 """Of curvature or stiffness at rest: difference from a beam above which `section: auto` is a strip."""
 PLATE = 0.05
 """Likewise above which a beam is told to be wrong."""
+THIN = 2.0
+"""Width over thickness from which on layers of unlike Poisson's ratios hold each other across, as those of plates do."""
 BROADEST = 100.0
 """w²κ/H up to which strips are asked whether they fold."""
 BISECTIONS = 20
@@ -46,7 +48,7 @@ class Departure:
     curved: float
 
 
-def departure(rod: Rod, at_edges: EdgeFigures) -> Departure:
+def departure(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Departure:
     """Return by how much a strip with the figures of a rod differs from a beam; nothing is said of one with fibres."""
     if any(layer.fibres for layer in rod.layers):
         return Departure(0.0, 0.0, 0.0, 0.0)
@@ -55,13 +57,16 @@ def departure(rod: Rod, at_edges: EdgeFigures) -> Departure:
     swells = at_edges.free_curvature() > 0.5 * curvature
     if all(layer.swelling == "along" for layer in rod.layers if layer.eigenstrain):
         swells[:] = False
-    change, swollen = 0.0, 0.0
+    change, swollen, stiffer, curl = 0.0, 0.0, 1.0, 1.0
+    if is_plate(scene, rod) and (at_edges.width > THIN * at_edges.thickness).any():
+        _, stiffer, _, curl = plate_section(scene, rod).growth
     if swells.any():
-        changes = swollen_curvature(ratio[swells], poisson) - 1.0
+        changes = curl * swollen_curvature(ratio[swells], poisson) - 1.0
         worst = int(np.abs(changes).argmax())
         change, swollen = float(changes[worst]), float(ratio[swells][worst])
     curved = float(ratio[~swells].max(initial=0.0))
-    return Departure(change, swollen, float(curved_stiffness(curved, poisson)) - 1.0 if curved else 0.0, curved)
+    of_stiffness = stiffer * float(curved_stiffness(curved, poisson)) - 1.0 if curved else 0.0
+    return Departure(change, swollen, of_stiffness, curved)
 
 
 def refusal(scene: SceneConfig, rod: Rod) -> str:
@@ -87,18 +92,20 @@ def refusal(scene: SceneConfig, rod: Rod) -> str:
     return ""
 
 
-def section_of(scene: SceneConfig, rod: Rod) -> str:
-    """Return the section of a rod in the laminate, `beam` or `strip`; `auto` is a strip where that differs from a beam
-    by more than `MOST` and can be computed.
+def section_of(scene: SceneConfig, rod: Rod, model: str = "laminate") -> str:
+    """Return the section of a rod in a model, `beam` or `strip`; `auto` is a strip where a beam does not feel what layers
+    have, and in the laminate where a strip differs from it by more than `MOST` and can be computed.
     """
     if rod.section != "auto":
-        return rod.section or "beam"
-    if scene.solver.model == "two_rod" or scene.coupling != Coupling():
+        return rod.section
+    if rod.feels_across:
+        return "strip"
+    if model == "two_rod" or rod.radius is not None:
         return "beam"
-    if rod.radius is not None:
-        return "beam"
-    found = departure(rod, edge_figures(scene, rod))
-    return "strip" if max(abs(found.of_curvature), found.of_stiffness) > MOST and not refusal(scene, rod) else "beam"
+    found = departure(scene, rod, edge_figures(scene, rod))
+    return (
+        "strip" if max(abs(found.of_curvature), abs(found.of_stiffness)) > MOST and not refusal(scene, rod) else "beam"
+    )
 
 
 def plate_of(scene: SceneConfig, rod: Rod) -> PlateSection | None:
@@ -120,25 +127,26 @@ def folding_ratio(poisson: float) -> float:
     return high
 
 
-def plates(scene: SceneConfig) -> Iterator[Figure]:
+def plates(scene: SceneConfig, model: str) -> Iterator[Figure]:
     """Yield how strips as wide as the rods of a scene differ from beams."""
     for rod in scene.rods:
-        yield from plate_figures(scene, rod, edge_figures(scene, rod))
+        yield from plate_figures(scene, rod, edge_figures(scene, rod), model)
 
 
-def plate_figures(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
-    """Yield how a strip as wide as a rod differs from a beam, and, of a strip, when it may fold and how high its
+def plate_figures(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures, model: str) -> Iterator[Figure]:
+    """Yield how a strip as wide as a rod differs from a beam in a model, and, of a strip, when it may fold and how high its
     section rises.
     """
     if rod.radius is not None:
         return
-    where, found, strip = f"rods.{rod.name}", departure(rod, at_edges), section_of(scene, rod) == "strip"
+    where, found, strip = f"rods.{rod.name}", departure(scene, rod, at_edges), section_of(scene, rod, model) == "strip"
     change, stiffer, told = found.of_curvature, found.of_stiffness, strip or rod.section == "beam"
     allowed = f"`section: {rod.section}`" if told else f"at most {100 * PLATE:g} %"
     if found.swollen > 0.0:
+        why = refusal(scene, rod) or "takes the model laminate"
         outside = (
-            "its section bends as well; that of a beam does not: give it `section: strip`, or, if its layers swell "
-            "along it alone, `swelling: along`, or `section: beam`, if a beam is meant"
+            f"its section bends as well; that of a beam does not, and a strip {why}; if its layers swell along it alone, "
+            "give them `swelling: along`, or the rod `section: beam`, if a beam is meant"
         )
         yield Figure(
             where,
@@ -160,7 +168,7 @@ def plate_figures(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterat
             stiffer / PLATE,
             "its section keeps its shape; that of a beam bends freely" if stiffer > PLATE and not told else "",
         )
-    plate = plate_of(scene, rod)
+    plate = plate_of(scene, rod) if strip else None
     if plate is not None and any(layer.fibres for layer in rod.layers):
         yield from _of_fibres(where, scene, rod, at_edges, plate)
     if not strip:

@@ -21,18 +21,19 @@ FAR = 0.5  # barrier distance over thickness
 COARSE = 2.0  # edge length over thickness and barrier distance, where something went through an edge
 
 
-def validity_warnings(scene: SceneConfig) -> Iterator[Figure]:
+def validity_warnings(scene: SceneConfig, model: str = "laminate") -> Iterator[Figure]:
     """Return the figures that are out of their range, each with the range and what that means."""
-    return (figure for figure in validity_figures(scene) if figure.outside)
+    return (figure for figure in validity_figures(scene, model) if figure.outside)
 
 
-def validity_figures(scene: SceneConfig) -> Iterator[Figure]:
+def validity_figures(scene: SceneConfig, model: str = "laminate") -> Iterator[Figure]:
     """Yield all figures of a scene on which the validity of the model depends."""
     thinnest = {}
     for rod in scene.rods:
         at_edges = edge_figures(scene, rod)
         thinnest[rod.name] = at_edges.thickness.min()
         yield from _of_section(scene, rod, at_edges)
+        yield from plate_figures(scene, rod, at_edges, model)
         yield from diffusion_figures(scene, rod)
     if scene.contact is not None:
         yield _of_barrier(*min(thinnest.items(), key=lambda item: item[1]), scene.contact.barrier_distance)
@@ -71,7 +72,6 @@ def _of_section(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Iterator
             bend / THICK_CURVATURE,
             "it is no thin rod" if bend > THICK_CURVATURE else "",
         )
-    yield from plate_figures(scene, rod, at_edges)
 
 
 def _of_shear(rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:

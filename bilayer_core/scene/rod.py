@@ -160,10 +160,10 @@ class Rod(Part):
     """Bottom first."""
     diffusion: Diffusions = []
     """Of moisture or heat through the layers; one field or several. Layers without one follow with their lags."""
-    section: Literal["beam", "strip", "auto"] | None = None
+    section: Literal["auto", "beam", "strip"] = "auto"
     """`beam`: the section keeps its shape, right for w²κ/H below about 1; `strip`: it curls across the width, of any
-    width; `auto`: `strip` where curvature or stiffness would differ by more than 1 %. A beam by default, with a warning
-    where a strip would differ by more than 5 %.
+    width; `auto`: `strip` with fibres and what swells across, and where curvature or stiffness would differ by more than
+    1 %, if a strip can be computed.
     """
     torsion: Literal["laminate", "layers"] = "laminate"
     """Torsional stiffness: of the bonded section, or the sum of the layers' own."""
@@ -192,6 +192,11 @@ class Rod(Part):
     def widest(self) -> float:
         """Largest width of its layers [m]."""
         return max(extremes(self.width_of(layer))[1] for layer in self.layers)
+
+    @property
+    def feels_across(self) -> bool:
+        """True if layers have fibres or swell across the path, which a beam does not feel."""
+        return any(layer.fibres is not None or layer.swelling == "across" for layer in self.layers)
 
     @property
     def edge_length(self) -> float:
@@ -488,13 +493,13 @@ def _faults_of_diffusion(rod: Rod) -> Iterator[Fault]:
 def _faults_of_section(rod: Rod) -> Iterator[Fault]:
     """Yield the faults of layers that only a strip can have."""
     for index, layer in enumerate(rod.layers):
-        if layer.fibres is not None and rod.section != "strip":
+        if layer.fibres is not None and rod.section == "beam":
             demand = "must be left out: a beam does not feel them; `section: strip` of the rod does"
             yield ("layers", index, "fibres"), layer.fibres.angle, demand
         elif layer.fibres is not None and layer.swelling != "isotropic":
             demand = "must be left out: `fibres` say in which direction the layer swells"
             yield ("layers", index, "swelling"), layer.swelling, demand
-        if layer.swelling == "across" and rod.section != "strip":
+        if layer.swelling == "across" and rod.section == "beam":
             demand = "must be isotropic or along: a beam does not feel it; `section: strip` of the rod does"
             yield ("layers", index, "swelling"), layer.swelling, demand
 

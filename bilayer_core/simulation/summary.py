@@ -109,7 +109,7 @@ def summarise(simulator: Any) -> dict:
         },
         "warnings": [
             *simulator.start_warnings,
-            *told(figure for figure in plates(simulator.scene) if figure.outside),
+            *told(figure for figure in plates(simulator.scene, simulator.plan.model) if figure.outside),
             *_warnings(statistics, numerical, through, simulator.plane_watch),
             *_of_contact(model, statistics.unresolved, largest),
             *folded(model, simulator._state),

@@ -8,6 +8,7 @@ from support.sample_scenes import GROUND, contact, layer, rod, scene
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SceneError
 from bilayer_core.model.edge_figures import edge_figures
+from bilayer_core.model.plan import simplest_model
 from bilayer_core.model.strip_choice import departure, folding_ratio, plates, section_of
 from bilayer_core.model.validity import validity_figures
 
@@ -23,7 +24,7 @@ def wide(section="auto", width=0.03, gain=0.006667, swelling="isotropic", more=N
 
 def chosen(**how):
     loaded = load_scene(wide(**how))
-    return section_of(loaded, loaded.rods[0])
+    return section_of(loaded, loaded.rods[0], simplest_model(loaded)[0])
 
 
 @pytest.mark.parametrize(
@@ -33,6 +34,7 @@ def chosen(**how):
         ({"width": 4.5e-3}, "beam"),  # w²κ/H 0.8, 0.6 % off
         ({"width": 7e-3}, "strip"),  # 2, 3 % off
         ({"swelling": "along"}, "strip"),  # its curvature is that of a beam, its stiffness is not
+        ({"swelling": "across", "width": 1e-3}, "strip"),  # which a beam does not feel
         ({"section": "beam"}, "beam"),
         ({"more": {"interval": [0, 0.1]}}, "beam"),
         ({"coupling": {"translation": 5.0}}, "beam"),
@@ -49,7 +51,9 @@ def test_check_says_how_a_strip_differs_when_it_folds_and_how_high_it_rises():
     folds = told["as a strip it swells up to w²κ/H of"]
     assert "36 (at most 8.65 (an eigenstrain of 0.16 %)): beyond, held straighter it may fold" in folds
     assert "2.25 mm across (at most 0.2 mm, the barrier distance)" in told["its section rises by"]
-    assert departure(loaded.rods[0], edge_figures(loaded, loaded.rods[0])).swollen == pytest.approx(36.0, rel=1e-3)
+    assert departure(loaded, loaded.rods[0], edge_figures(loaded, loaded.rods[0])).swollen == pytest.approx(
+        36.0, rel=1e-3
+    )
 
 
 def test_the_height_of_a_section_is_what_layers_that_swell_across_make_of_it():
@@ -96,10 +100,31 @@ def test_two_rods_cannot_be_strips():
         Simulator(load_scene(wide("strip")), model="two_rod")
 
 
-@pytest.mark.parametrize("section", ["beam", "auto"])
-def test_layers_that_swell_across_need_a_strip(section):
+def test_layers_that_swell_across_need_a_strip():
     with pytest.raises(SceneError, match=r"layers\.q\.swelling.*a beam does not feel it; `section: strip`"):
-        load_scene(wide(section, swelling="across"))
+        load_scene(wide("beam", swelling="across"))
+
+
+def test_layers_of_unlike_poisson_ratio_are_a_strip_at_any_width():
+    """A plate that swells alike in all directions bends as a beam whose moduli are E/(1 − ν)."""
+    narrow = wide(width=2.5e-3)  # w²κ/H 0.25
+    assert section_of(load_scene(narrow), load_scene(narrow).rods[0]) == "beam"
+    moduli, ratios = (1e4, 1e6), (0.3, 0.45)
+    narrow["materials"] = {
+        name: {"youngs_modulus": modulus, "poisson_ratio": ratio, "density": 1000}
+        for name, modulus, ratio in zip("ab", moduli, ratios, strict=True)
+    }
+    for name, own in zip("ab", narrow["rods"][0]["layers"], strict=True):
+        own["material"] = name
+    loaded = load_scene(narrow)
+    assert section_of(loaded, loaded.rods[0]) == "strip"
+    told = {figure.what: figure for figure in plates(loaded, "two_rod")}
+    as_beam, as_plate = (
+        moduli_ratio / (moduli_ratio**2 + 14.0 * moduli_ratio + 1.0)  # Timoshenko's curvature of equal thicknesses
+        for moduli_ratio in (moduli[0] / moduli[1], moduli[0] / moduli[1] * (1.0 - ratios[1]) / (1.0 - ratios[0]))
+    )
+    found = told["a plate as wide, swelling alike in all directions, would curl"].value
+    assert found.startswith(f"{100 * (1.0 - as_plate / as_beam):.2g} % less")
 
 
 def test_a_beam_whose_layers_swell_along_it_alone_is_told_its_stiffness_and_no_curvature():
@@ -108,11 +133,26 @@ def test_a_beam_whose_layers_swell_along_it_alone_is_told_its_stiffness_and_no_c
     assert not any("swelling alike" in what for what in told)
 
 
-@pytest.mark.parametrize(("how", "warned"), [({}, True), ({"section": "beam"}, False), ({"section": "strip"}, False)])
-def test_a_run_warns_of_a_wide_rod_whose_section_nobody_chose(how, warned):
-    simulator = Simulator(load_scene(wide(**{"section": None} | how)))
+PART = {"more": {"interval": [0, 0.1]}}
+
+
+@pytest.mark.parametrize(
+    ("how", "model", "warned"),
+    [
+        ({}, "auto", ""),
+        ({"section": "beam"}, "auto", ""),
+        ({}, "two_rod", "model laminate"),
+        (PART, "auto", "interval"),
+    ],
+)
+def test_a_run_warns_of_a_wide_rod_that_cannot_be_a_strip(how, model, warned):
+    simulator = Simulator(load_scene(wide(**how)), model=model)
     simulator.run(1e-3)
     told = " ".join(simulator.summary()["warnings"])
-    assert ("would curl" in told and "`section: strip`" in told) == warned
-    figure = next(figure for figure in plates(simulator.scene) if "swelling alike" in figure.line(figure.where))
-    assert bool(figure.outside) == warned
+    assert ("would curl" in told and warned in told) == bool(warned)
+    figure = next(
+        figure
+        for figure in plates(simulator.scene, simulator.plan.model)
+        if "swelling alike" in figure.line(figure.where)
+    )
+    assert bool(figure.outside) == bool(warned)

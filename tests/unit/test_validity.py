@@ -92,8 +92,8 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_the_warning_is_given_beyond_the_limit_and_not_within(case):
     within, beyond, text = CASES[case]
-    (found,) = (figure for figure in validity_figures(load_scene(beyond)) if str(figure).startswith(text))
-    same = [figure for figure in validity_figures(load_scene(within)) if figure.limit == found.limit]
+    (found,) = (figure for figure in validity_figures(load_scene(beyond), "two_rod") if str(figure).startswith(text))
+    same = [figure for figure in validity_figures(load_scene(within), "two_rod") if figure.limit == found.limit]
     assert [figure.outside for figure in same] == ([] if case == "shear" else [""])  # which is told from its limit on
 
 
