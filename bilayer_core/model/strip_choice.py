@@ -22,7 +22,7 @@ MOST = 0.01
 PLATE = 0.05
 """Likewise above which a beam is told to be wrong."""
 THIN = 2.0
-"""Width over thickness from which on layers of unlike Poisson's ratios hold each other across, as those of plates do."""
+"""Width over thickness from which on layers of unlike Poisson's ratios hold each other across, as plates do."""
 BROADEST = 100.0
 """w²κ/H up to which strips are asked whether they fold."""
 BISECTIONS = 20
@@ -93,8 +93,8 @@ def refusal(scene: SceneConfig, rod: Rod) -> str:
 
 
 def section_of(scene: SceneConfig, rod: Rod, model: str = "laminate") -> str:
-    """Return the section of a rod in a model, `beam` or `strip`; `auto` is a strip where a beam does not feel what layers
-    have, and in the laminate where a strip differs from it by more than `MOST` and can be computed.
+    """Return the section of a rod in a model, `beam` or `strip`; `auto` is a strip where a beam does not feel what
+    layers have, and in the laminate where a strip differs from it by more than `MOST` and can be computed.
     """
     if rod.section != "auto":
         return rod.section
@@ -134,8 +134,8 @@ def plates(scene: SceneConfig, model: str) -> Iterator[Figure]:
 
 
 def plate_figures(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures, model: str) -> Iterator[Figure]:
-    """Yield how a strip as wide as a rod differs from a beam in a model, and, of a strip, when it may fold and how high its
-    section rises.
+    """Yield how a strip as wide as a rod differs from a beam in a model, and, of a strip, when it may fold and how high
+    its section rises.
     """
     if rod.radius is not None:
         return
@@ -145,8 +145,8 @@ def plate_figures(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures, model: st
     if found.swollen > 0.0:
         why = refusal(scene, rod) or "takes the model laminate"
         outside = (
-            f"its section bends as well; that of a beam does not, and a strip {why}; if its layers swell along it alone, "
-            "give them `swelling: along`, or the rod `section: beam`, if a beam is meant"
+            f"its section bends as well; that of a beam does not, and a strip {why}; if its layers swell along it "
+            "alone, give them `swelling: along`, or the rod `section: beam`, if a beam is meant"
         )
         yield Figure(
             where,

@@ -162,8 +162,8 @@ class Rod(Part):
     """Of moisture or heat through the layers; one field or several. Layers without one follow with their lags."""
     section: Literal["auto", "beam", "strip"] = "auto"
     """`beam`: the section keeps its shape, right for w²κ/H below about 1; `strip`: it curls across the width, of any
-    width; `auto`: `strip` with fibres and what swells across, and where curvature or stiffness would differ by more than
-    1 %, if a strip can be computed.
+    width; `auto`: `strip` with fibres and what swells across, and where curvature or stiffness would differ by more
+    than 1 %, if a strip can be computed.
     """
     torsion: Literal["laminate", "layers"] = "laminate"
     """Torsional stiffness: of the bonded section, or the sum of the layers' own."""
