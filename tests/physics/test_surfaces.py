@@ -8,14 +8,15 @@ from support.sample_scenes import HALF_SIZES, contact, layer, rod, scene
 
 from bilayer_core import load_scene
 from bilayer_core.contact.gap import gap_normal
-from bilayer_core.contact.near import list_near
 from bilayer_core.contact.step_bound import KEPT_FRACTION, motion_of_points, step_bound
+from bilayer_core.forces.surface_pairs import list_surface_pairs
 from bilayer_core.jit import piece
 from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.model.build_model import build_model
 from bilayer_core.model.records.contacts import RodPoints, Surfaces
 from bilayer_core.model.records.parts import Bodies, Strands
 from bilayer_core.model.records.problem import System
+from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.model.shape_numbers import NUMBER
 from bilayer_core.model.state import initial_state
@@ -40,11 +41,6 @@ def blocking_tested(surfaces, strands, system, at):
 @piece(float, Surfaces, Bodies, Strands, System, Configuration)
 def motion_tested(surfaces, bodies, strands, system, at):
     return motion_of_points(surfaces, bodies, strands, system, at)
-
-
-@piece(int, Surfaces, Configuration, float)
-def list_tested(surfaces, at, margin):
-    return list_near(surfaces, at, margin)
 
 
 class Pair:
@@ -295,18 +291,21 @@ def test_a_list_of_near_pairs_holds_what_is_near_and_the_nearest():
             can_collide=can_collide,
             extent=np.zeros(4),
             weight=np.ones(300),
+            margin=np.array([-1.0]),
+            near_count=np.zeros(1, dtype=np.int64),
             **listed,
             **{name: np.zeros(shape) for name, shape in then.items()},
         )
         gaps = {
             (s, i): gap_tested(surfaces, at, i, s) for s in range(4) for i in range(300) if can_collide[s, group[i]]
         }
-        count = list_tested(surfaces, at, 0.02)
+        assert list_surface_pairs(surfaces, at, 0.01) == READY
+        count, within = surfaces.near_count[0], reach + max(reach, 0.04)
         pairs = list(
             zip(*(listed[name][:count].tolist() for name in ("near_surface", "near_contact_point")), strict=True)
         )
         assert pairs == sorted(pairs) and set(pairs) <= gaps.keys()
-        assert {pair for pair, gap in gaps.items() if gap <= reach + 0.02} <= set(pairs)
+        assert {pair for pair, gap in gaps.items() if gap <= within} <= set(pairs)
         assert min(gaps, key=gaps.get) in pairs
         assert count < len(gaps)
         assert np.array_equal(surfaces.listed_contact_point, contact_point) and np.array_equal(
