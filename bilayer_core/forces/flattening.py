@@ -35,9 +35,11 @@ from __future__ import annotations
 
 import math
 
-from bilayer_core.jit import kernel
+from bilayer_core.jit import kernel, piece, record
+from bilayer_core.jit.record import Vector
 from bilayer_core.kinematics.vector import angle, dot, row
 from bilayer_core.model.plate_strip import TERMS
+from bilayer_core.model.records.parts import Flattening
 
 TWO_PI = 2.0 * math.pi
 SERIES = 1024.0
@@ -97,6 +99,22 @@ def flatness(series, i, offset, x):
     value = (1.0 - g) / z
     first = -(g1 + 2.0 * t * value) / z
     return value, sign * first, -(g2 + 2.0 * value + 4.0 * t * first) / z
+
+
+@record
+class Flatness:
+    """φ of each strip joint."""
+
+    x: Vector
+    value: Vector
+
+
+@piece(int, Flattening, Flatness)
+def write_flatness(flattening, of):
+    """Write φ for those who look at sections between steps."""
+    for i in range(of.x.shape[0]):
+        of.value[i] = flatness(flattening.series, i, flattening.offset[i], of.x[i])[0]
+    return 0
 
 
 @kernel

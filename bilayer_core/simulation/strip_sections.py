@@ -16,7 +16,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bilayer_core.forces.flattening import flatness
+from bilayer_core.forces.flattening import Flatness, write_flatness
 from bilayer_core.model.model import Model
 from bilayer_core.model.plate_strip import folds
 from bilayer_core.model.state import State
@@ -59,9 +59,9 @@ def curvatures(model: Model, state: State) -> tuple[Array, Array]:
     kappa, psi = bend / (1.0 + np.einsum("ki,ki->k", a, b)), state.twist[strips.joint]
     along, twist, across = _natural(model, state)
     free = across - strips.curl * (kappa - along) - strips.skew * (psi - twist)
-    flattened, x = kappa * free - psi**2 + strips.start, strips.scale * kappa
-    phi = [flatness(strips.series, i, strips.offset[i], x[i])[0] for i in range(len(x))]
-    curved = free - flattened * strips.scale * x * phi
+    flattened, phi = kappa * free - psi**2 + strips.start, Flatness(x=strips.scale * kappa, value=np.zeros(len(kappa)))
+    write_flatness(strips, phi)
+    curved = free - flattened * strips.scale * phi.x * phi.value
     length = model.voronoi_length[strips.joint]
     place = np.arange(len(kappa))
     nearest = np.abs(place[:, None] - place[inside]).argmin(axis=1) if inside.any() else place

@@ -47,6 +47,7 @@ SCENE = {
             "path": {"shape": "straight", "start": [0, 0, 0], "direction": [1, 0, 0], "length": "50 mm"},
             "normal": [0, 0, 1],
             "stations": 11,
+            "section": "beam",
             "clamp_start": "wall",
             "layers": [
                 {"name": "passive", "material": "gel", "thickness": "1 mm"},

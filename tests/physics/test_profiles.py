@@ -107,9 +107,8 @@ def test_the_warnings_are_about_the_worst_section():
     layers = [layer("bottom"), layer("top", eigenstrain={"stimulus": "heat", "gain": 0.05})]
 
     def warned(**more):
-        return " ".join(
-            map(str, validity_warnings(load_scene(scene([rod(layers, length=LENGTH, **more)], stimuli=heat))))
-        )
+        strip = rod(layers, length=LENGTH, section="auto", **more)
+        return " ".join(map(str, validity_warnings(load_scene(scene([strip], stimuli=heat)), "two_rod")))
 
     assert "would curl 7.7 % less than computed (w²κ/H 4)" in warned(width=linear(1e-3, 15e-3))
     assert warned(width=linear(1e-3, 10e-3)) == ""

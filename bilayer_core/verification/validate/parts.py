@@ -16,7 +16,7 @@ def layer(name="only", thickness=1e-3, material="gel", **more):
 
 
 def rod(layers, length=0.1, stations=21, start=(0, 0, 0), name="rod", width=0.01, **more):
-    """Return a straight rod along x, its normal along z."""
+    """Return a straight beam along x, its normal along z."""
     path = {"shape": "straight", "start": list(start), "direction": [1, 0, 0], "length": length}
     return {
         "name": name,
@@ -24,6 +24,7 @@ def rod(layers, length=0.1, stations=21, start=(0, 0, 0), name="rod", width=0.01
         "path": path,
         "normal": [0, 0, 1],
         "stations": stations,
+        "section": "beam",
         "layers": layers,
         **more,
     }
