@@ -21,7 +21,7 @@ def bilayer(gain=0.01, thickness=0.5e-3, length=0.1, width=0.004, **more):
         layer("passive", thickness=thickness),
         layer("active", thickness=thickness, eigenstrain={"stimulus": "heat", "gain": gain}),
     ]
-    return scene([rod(layers, length=length, width=width, stations=51)], stimuli=HEAT, **more)
+    return scene([rod(layers, length=length, width=width, stations=51, section="auto")], stimuli=HEAT, **more)
 
 
 def warnings(content):
@@ -44,7 +44,8 @@ def test_a_slender_rod_of_small_strain_has_no_warning_and_all_its_figures_are_to
 
 def bent_by_nature(width):
     """A strip of one layer, 1 mm thick, that is curved by 5 1/m at rest."""
-    return scene([rod([layer(thickness=1e-3, natural_curvature=5.0)], length=0.3, width=width, stations=51)])
+    layers = [layer(thickness=1e-3, natural_curvature=5.0)]
+    return scene([rod(layers, length=0.3, width=width, stations=51, section="auto")])
 
 
 # Of each warning: a scene within the limit, one beyond, and what the warning says. Curvature × thickness is
