@@ -1,6 +1,6 @@
 """Logs and saved states with random damage are read, or refused in one line that names the file, by every command.
 
-100 logs and 200 states by default, the same ones every time. More, and others:
+40 logs and 100 states by default, the same ones every time. More, and others:
 
     FUZZ_LOGS=2000 FUZZ_STATES=1000 FUZZ_SEED=7 pytest -m "" tests/fuzz/test_mutated_logs.py
 
@@ -27,8 +27,8 @@ from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_core.log.run.state_file import write_state
 from fuzz.log_mutations import write_mutated_log, write_mutated_state
 
-LOGS = int(os.environ.get("FUZZ_LOGS", "100"))
-STATES = int(os.environ.get("FUZZ_STATES", "200"))
+LOGS = int(os.environ.get("FUZZ_LOGS", "40"))
+STATES = int(os.environ.get("FUZZ_STATES", "100"))
 SEED = int(os.environ.get("FUZZ_SEED", "1"))
 FAILURES = Path(os.environ.get("FUZZ_FAILURES") or Path(__file__).resolve().parents[2] / ".pytest_cache" / "fuzz")
 DONE, DIFFERS, REFUSED, STOPPED = range(4)

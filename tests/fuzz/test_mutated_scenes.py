@@ -96,7 +96,7 @@ def test_messages_that_tell_nothing_count_as_failures(message):
         require_clear(message)
 
 
-@pytest.mark.slow
+@pytest.mark.verify
 def test_a_process_that_exceeds_its_limits_or_dies_counts_as_a_failure():
     told = []
     for longest, *calls in (

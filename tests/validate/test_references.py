@@ -88,7 +88,14 @@ def test_sliding_along_an_axis_is_coulombs_friction():
     assert v == pytest.approx([0.3 * (1.5 - 0.1 * 9.81), 0.0], rel=1e-4, abs=1e-12)
 
 
-@pytest.mark.parametrize(("degrees", "stiffness", "ratio"), [(30.0, 1.0, 10), (45.0, 1.0, 100), (30.0, 8.0, 36)])
+@pytest.mark.parametrize(
+    ("degrees", "stiffness", "ratio"),
+    [
+        pytest.param(30.0, 1.0, 10, marks=pytest.mark.verify),
+        pytest.param(45.0, 1.0, 100, marks=pytest.mark.verify),
+        (30.0, 8.0, 36),
+    ],
+)
 def test_the_shapes_of_crossed_layers_are_those_of_a_plate_solved_across_its_width(degrees, stiffness, ratio):
     width, half, curvature = 1.0, 0.5e-3, ratio * 1e-3
     sheet, across = orthotropic(stiffness, 1.0, 0.3, 1.0 / 2.6), (0.0, curvature * 1e-3 / 1.5)
@@ -98,7 +105,7 @@ def test_the_shapes_of_crossed_layers_are_those_of_a_plate_solved_across_its_wid
     assert found.rest(start) / curvature == pytest.approx(answer, abs=1e-5)
 
 
-@pytest.mark.parametrize("ratio", [6, 36])
+@pytest.mark.parametrize("ratio", [pytest.param(6, marks=pytest.mark.verify), 36])
 def test_the_curvature_of_unlike_ratios_is_that_of_a_plate_solved_across_its_width(ratio):
     half, curvature = 0.5e-3, ratio * 1e-3
     sheets, swelling = [isotropic(1.0, nu) for nu in strips.UNLIKE.values()], curvature * 1e-3 / 1.5
