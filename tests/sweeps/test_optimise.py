@@ -24,14 +24,14 @@ NEAR = {"near": lambda run: -((run.parameters["gain"] - 1.7) ** 2) - (run.parame
 @pytest.fixture
 def ranges():
     """A sweep with ranges and a choice, for searches."""
-    return {**STRIP, "parameters": RANGES, "design": "sobol", "samples": 8}
+    return {**STRIP, "parameters": RANGES}
 
 
 def search_in_process(content, metric, trials, functions=None):
     """A search without processes, as `optimise` makes it with one worker."""
     from bilayer_core.studies.sweeps.execute_runs import execute
 
-    read = read_sweep(content, functions=functions)
+    read = read_sweep(content, functions=functions, is_search=True)
     search, rows = Search(read, metric, True, 3), []
     for _ in range(trials):
         point = search.ask()
@@ -59,23 +59,24 @@ def test_the_same_search_is_made_again(ranges):
 
 def test_a_search_that_is_continued_knows_what_was_tried(ranges):
     _, rows = search_in_process(ranges, "near", 25, NEAR)
-    later = Search(read_sweep(ranges, functions=NEAR), "near", True, 3, rows)
+    later = Search(read_sweep(ranges, functions=NEAR, is_search=True), "near", True, 3, rows)
     assert later.asked == 25
 
     def distance(search):
         return sum(abs(search.ask().parameters["gain"] - 1.7) for _ in range(12))
 
-    assert distance(later) < distance(Search(read_sweep(ranges, functions=NEAR), "near", True, 3))
+    assert distance(later) < distance(Search(read_sweep(ranges, functions=NEAR, is_search=True), "near", True, 3))
 
 
 def test_a_finer_run_has_a_tenth_of_the_tolerance_or_a_quarter_of_the_step(ranges):
     import json
 
-    read = read_sweep(ranges)
+    read = read_sweep(ranges, is_search=True)
     values = {"gain": 1.0, "length": 80.0}
     assert json.loads(finer_job(read.job, values).scene)["solver"]["tolerance"] == pytest.approx(1e-5)
     ranges["set"] = {"solver.tolerance": None, "solver.dt": "1 ms", "duration": 0.3}
-    assert json.loads(finer_job(read_sweep(ranges).job, values).scene)["solver"]["dt"] == pytest.approx(2.5e-4)
+    fixed = read_sweep(ranges, is_search=True)
+    assert json.loads(finer_job(fixed.job, values).scene)["solver"]["dt"] == pytest.approx(2.5e-4)
 
 
 def test_a_search_on_processes_is_confirmed_resumed_and_written(ranges, cluster, tmp_path):

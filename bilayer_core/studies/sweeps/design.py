@@ -14,6 +14,8 @@ from bilayer_core.studies.sweeps.spec import MOST_RUNS, Parameter, SweepSpec
 
 SEED = "seed"
 """Column of `repeats`."""
+ENDS = 2
+"""Values of a range that is searched and has no count: those that its scenes are checked at."""
 Values = dict[str, Any]
 """By parameter: plain numbers in the parameter's unit, or what a list of values has."""
 
@@ -30,7 +32,7 @@ def count_of(spec: SweepSpec) -> int:
     if spec.samples is not None:
         runs = spec.samples * repeats
     else:
-        lengths = [len(of.values) if of.values is not None else of.count or 0 for of in spec.parameters.values()]
+        lengths = [len(of.values) if of.values is not None else of.count or ENDS for of in spec.parameters.values()]
         runs = (prod(lengths) if spec.design == "grid" else lengths[0]) * repeats
     if runs > MOST_RUNS:
         raise InputError(f"sweep: has {runs} runs; at most {MOST_RUNS} are allowed")
@@ -58,7 +60,7 @@ def _points(spec: SweepSpec) -> Iterator[Values]:
 def _levels(parameter: Parameter) -> list[Any]:
     if parameter.levels is not None:
         return list(parameter.levels)
-    return [at(parameter, float(u)) for u in np.linspace(0.0, 1.0, parameter.count)]
+    return [at(parameter, float(u)) for u in np.linspace(0.0, 1.0, parameter.count or ENDS)]
 
 
 def at(parameter: Parameter, u: float) -> Any:

@@ -228,7 +228,7 @@ def optimise(
     Parameters
     ----------
     spec : str, Path or mapping
-        Sweep file, or its content; its design does not matter, `start` of parameters is the first run.
+        Sweep file, or its content; its design and `count` do not matter; `start` is where the search begins.
     metric : str
     largest : bool
     trials : int
@@ -250,7 +250,7 @@ def optimise(
         If anything that is asked for cannot be, or no run has a value of the metric.
     """
     directory = None if out is None else Path(out)
-    read = read_sweep(spec, directory)
+    read = read_sweep(spec, directory, is_search=True)
     _refuse_unsearchable(read, metric)
     processes = Processes(workers, scheduler, security, dashboard)
     content = read.content | {"search": [metric, largest, seed]}

@@ -74,7 +74,11 @@ class Sweep:
 
 
 def read_sweep(
-    spec: str | Path | Mapping[str, Any], out: Path | None = None, functions: Any = None, run_code: bool = True
+    spec: str | Path | Mapping[str, Any],
+    out: Path | None = None,
+    functions: Any = None,
+    run_code: bool = True,
+    is_search: bool = False,
 ) -> Sweep:
     """Read and check a sweep: the scene, key paths, metrics, functions.
 
@@ -88,13 +92,15 @@ def read_sweep(
         Further metrics that are Python functions, by name.
     run_code : bool
         Whether the Python files that the sweep file names may run; if not, less is checked.
+    is_search : bool
+        Whether the ranges are searched, so that they need no count.
 
     Raises
     ------
     InputError, SceneError
         One line for each fault.
     """
-    read, directory, source = read_spec(spec)
+    read, directory, source = read_spec(spec, is_search)
     functions = dict(functions or {})
     for name in functions:
         if name in read.parameters or name in read.metrics:

@@ -298,26 +298,32 @@ class SweepSpec(Part):
                     faults.append((("logs", name), name, f"must be a column of results ({', '.join(columns)})"))
         return faults
 
+    def uncounted(self) -> list[str]:
+        """Return the parameters of a grid or a list that have a range and do not say how many values."""
+        if self.samples is not None:
+            return []
+        return [name for name, of in self.parameters.items() if of.values is None and of.count is None]
+
     def _faults_of(self, name: str, parameter: Parameter, sampled: bool) -> list[Fault]:
         where, faults = ("parameters", name), []
         if name in RESERVED or (name == "seed" and self.repeats):
             faults.append((where, name, f"must be another name: {name} is a column of results anyway"))
         if parameter.path is None and self.change is None:
             faults.append(((*where, "path"), None, "must be given: a key path of the scene (or `change`, a function)"))
-        if parameter.values is None and not sampled and parameter.count is None:
-            faults.append(((*where, "count"), None, f"must be given for the design {self.design}: how many values"))
         if sampled and parameter.count is not None:
             faults.append(((*where, "count"), parameter.count, f"must be left out for the design {self.design}"))
         return faults
 
 
-def read_spec(spec: str | Path | Mapping[str, Any]) -> tuple[SweepSpec, Path, str]:
+def read_spec(spec: str | Path | Mapping[str, Any], is_search: bool = False) -> tuple[SweepSpec, Path, str]:
     """Read and validate a sweep file.
 
     Parameters
     ----------
     spec : str, Path or mapping
         A file, the name of a bundled sweep, or content; files that content names are relative to the working directory.
+    is_search : bool
+        Whether the ranges are searched, so that nobody needs to say how many values they have.
 
     Returns
     -------
@@ -347,6 +353,10 @@ def read_spec(spec: str | Path | Mapping[str, Any]) -> tuple[SweepSpec, Path, st
         kind = "nothing" if content is None else type(content).__name__
         raise InputError(f"{source}: found {kind}; must be a mapping of keys to values, see docs/sweeps.md")
     try:
-        return SweepSpec.model_validate(dict(content)), directory, source
+        read = SweepSpec.model_validate(dict(content))
     except ValidationError as error:
         raise InputError(tell(error, SweepSpec, content, source)) from None
+    if not is_search and (uncounted := read.uncounted()):
+        told = f"count: found null; must be given for the design {read.design}: how many values"
+        raise InputError("\n".join(f"{source}: parameters.{name}.{told}" for name in uncounted))
+    return read, directory, source
