@@ -22,6 +22,7 @@ from bilayer_core.forces.joints import Joints
 from bilayer_core.integrators.method import Method
 from bilayer_core.integrators.sdirk2 import METHOD as SELF_STARTING
 from bilayer_core.model.bend_faces import bend_faces
+from bilayer_core.model.bent_plates import plates_of_bends
 from bilayer_core.model.contact_points import contact_point_names
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.contacts import RodContact, Surfaces
@@ -86,11 +87,13 @@ class Engine:
         self._integration: Integration | None = None
         self._no_joints = Joints.absent()
         self._evaluated = True  # whether forces are those of `end`
-        faces, thickness = bend_faces(model)
+        (faces, thickness), (plate, free) = bend_faces(model), plates_of_bends(model)
         self.extrema = RunExtrema.zeros(
             sizes,
             faces=faces,
             thickness=thickness,
+            plate=plate,
+            free=free,
             mass=float(model.rods.node_mass.sum()),
             voronoi_length=model.voronoi_length,
         )
@@ -106,7 +109,7 @@ class Engine:
         """Forget the extrema of the run; the mass centre is at `height` [m]."""
         extrema = self.extrema
         for name in extrema.changing:
-            setattr(extrema, name, 0.0)
+            setattr(extrema, name, 0)
         extrema.height, extrema.least_gap = height, math.inf
         extrema.body_top[:] = -math.inf
         extrema.nodes[:], extrema.most_nodes[:], extrema.first_contact[:] = 0, 0, math.nan

@@ -1,7 +1,8 @@
 """Extrema over a run: heights, gaps, contact forces, curvature, strain, and what touches what.
 
 The strain of the outermost fibre is that beyond the shape that layers take without load: with ε and χ of a curve, ε̄ and
-χ̄ at rest, and y the height of a face over it, (ε − ε̄) − y (χ − χ̄). Curvature × thickness takes the whole section.
+χ̄ at rest, and y the height of a face over it, (ε − ε̄) − y (χ − χ̄). Curvature × thickness takes the whole section. A
+beam that loads bend is judged as a plate by χ − χ̄ (`model.bent_plates`).
 """
 
 from __future__ import annotations
@@ -42,6 +43,9 @@ def count_shape(p, state, at, stage, extrema):
         extrema.curvature = max(extrema.curvature, curvature)
         extrema.curvature_by_thickness = max(extrema.curvature_by_thickness, curvature * extrema.thickness[j])
         rest = p.off_axis.rest[j, 0] if p.off_axis.exists else stage.rest_joint[j, 0]
+        by_loads = (abs(bend - rest) / voronoi[j] - extrema.free[j]) * extrema.plate[j]
+        if by_loads > extrema.bent_plate:
+            extrema.bent_plate, extrema.most_bent = by_loads, j
         stretch = _strain_about(p.strands, stage, at, j)
         for f in range(2):
             strain = abs(stretch - extrema.faces[j, f] * (bend - rest) / voronoi[j])

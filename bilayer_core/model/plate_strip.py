@@ -30,6 +30,8 @@ LARGE = 30.0
 """ψ above which g is 2/ψ to the last digit."""
 RATIOS = np.geomspace(0.05, 1e4, 400)
 """w²κ̄/H between which curvatures are interpolated."""
+STEP = 1e-4
+"""Of ratios, for a difference."""
 CURVATURES = np.linspace(0.01, 1.6, 1600)
 """Of κ/κ̄, where tangents are looked at."""
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
@@ -89,6 +91,15 @@ def swollen_curvature_across(ratio: Array, poisson: float) -> Array:
 def curved_stiffness(ratio: Array, poisson: float) -> Array:
     """Return the bending stiffness at rest, over EI, of strips that are curved without swelling, by their w²κ/H."""
     return (1.0 - poisson**2 * _factor(ratio, poisson)) / (1.0 - poisson**2)
+
+
+def bent_stiffness(ratio: Array, poisson: float) -> Array:
+    """Return the moment over EI κ of flat strips that are bent to w²κ/H: with the energy EI κ² g/2, in which g is
+    `curved_stiffness`, d(r² g)/d(r²).
+    """
+    ends = np.multiply.outer([1.0 - STEP, 1.0 + STEP], ratio)
+    energy = ends**2 * curved_stiffness(ends, poisson)
+    return (energy[1] - energy[0]) / (ends[1] ** 2 - ends[0] ** 2)
 
 
 @lru_cache(maxsize=256)

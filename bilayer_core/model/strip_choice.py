@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -11,7 +11,13 @@ import numpy as np
 from bilayer_core.model.edge_figures import EdgeFigures, edge_figures
 from bilayer_core.model.findings import Figure
 from bilayer_core.model.plate_section import PlateSection, is_plate, plate_section
-from bilayer_core.model.plate_strip import curved_stiffness, folds, swollen_curvature, swollen_curvature_across
+from bilayer_core.model.plate_strip import (
+    bent_stiffness,
+    curved_stiffness,
+    folds,
+    swollen_curvature,
+    swollen_curvature_across,
+)
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.diffusion_modes import strain_at
 from bilayer_core.scene.profile import Profile
@@ -118,12 +124,22 @@ def folding_ratio(poisson: float) -> float:
     """Return w²κ̄/H from which on strips that swell alike in all directions have negative tangents; infinite if none
     has.
     """
+    return _least_ratio(lambda ratio: folds(ratio, poisson))
+
+
+@lru_cache(maxsize=32)
+def stiff_ratio(poisson: float) -> float:
+    """Return w²κ/H from which on a plate that loads bend is stiffer than a beam by `PLATE`; infinite if none is."""
+    return _least_ratio(lambda ratio: float(bent_stiffness(ratio, poisson)) > 1.0 + PLATE)
+
+
+def _least_ratio(is_beyond: Callable[[float], bool]) -> float:
     low, high = 0.0, BROADEST
-    if not folds(high, poisson):
+    if not is_beyond(high):
         return np.inf
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if folds(middle, poisson) else (middle, high)
+        low, high = (low, middle) if is_beyond(middle) else (middle, high)
     return high
 
 

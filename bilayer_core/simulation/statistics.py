@@ -9,6 +9,7 @@ import numpy as np
 
 from bilayer_core.engine.energy_account import NUMERICAL
 from bilayer_core.engine.step_outcome import IntegrationReport
+from bilayer_core.model.bent_plates import BENT_PLATE
 from bilayer_core.model.model import Model
 from bilayer_core.model.state import State
 from bilayer_core.model.validity import LARGE_STRAIN, THICK_CURVATURE
@@ -40,9 +41,11 @@ class RunStatistics:
 
     Times in s, lengths in m, forces in N, residuals in m/s, curvatures in 1/m. `max_strain` is the largest magnitude of
     the strain of an edge without its eigenstrain, `max_fibre_strain` that of the fibre strained most, and
-    `max_curvature_by_thickness` the largest product of both (`engine.run_extrema`); `body_tops` is the greatest height
-    of each body. These and `max_curvature` count the state at the start too. `numerical_before` is the numerical energy
-    of the state where the run began, `put_in` and `taken_out` are sums of what each step was supplied and lost [J].
+    `max_curvature_by_thickness` the largest product of both (`engine.run_extrema`); `bent_plate` is the largest
+    curvature by loads over what a beam as wide may have, and its joint (`model.bent_plates`); `body_tops` is the
+    greatest height of each body. These and `max_curvature` count the state at the start too. `numerical_before` is the
+    numerical energy of the state where the run began, `put_in` and `taken_out` are sums of what each step was supplied
+    and lost [J].
     """
 
     steps: int = 0
@@ -66,6 +69,7 @@ class RunStatistics:
     max_strain: float = 0.0
     max_fibre_strain: float = 0.0
     max_curvature_by_thickness: float = 0.0
+    bent_plate: tuple[float, int] = (0.0, 0)
     put_in: float = 0.0
     taken_out: float = 0.0
     numerical_before: float = 0.0
@@ -78,6 +82,7 @@ class RunStatistics:
         told = (
             (self.max_fibre_strain > LARGE_STRAIN, FIBRE_STRAIN),
             (self.max_curvature_by_thickness > THICK_CURVATURE, CURVATURE_BY_THICKNESS),
+            (self.bent_plate[0] > 1.0, BENT_PLATE),
         )
         return tuple(text for passed, text in told if passed)
 
@@ -130,6 +135,7 @@ class RunStatistics:
         )
         self.max_curvature, self.max_strain = extrema.curvature, extrema.strain
         self.max_fibre_strain, self.max_curvature_by_thickness = extrema.fibre_strain, extrema.curvature_by_thickness
+        self.bent_plate = extrema.bent_plate, extrema.most_bent
         self.put_in, self.taken_out = extrema.put_in, extrema.taken_out
         self.body_tops = dict(zip(model.bodies.names, extrema.body_top.tolist(), strict=True))
         if not model.has_surface_contact:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bilayer_core.engine.energy_account import LARGEST, NUMERICAL
+from bilayer_core.model.bent_plates import bent_plate
 from bilayer_core.model.findings import told
 from bilayer_core.model.impacts import heaviest, stiffness_that_holds
 from bilayer_core.model.model import Model
@@ -111,6 +112,7 @@ def summarise(simulator: Any) -> dict:
             *simulator.start_warnings,
             *told(figure for figure in plates(simulator.scene, simulator.plan.model) if figure.outside),
             *_warnings(statistics, numerical, through, simulator.plane_watch),
+            *([bent_plate(model, plan.model, *statistics.bent_plate)] if statistics.bent_plate[0] > 1.0 else []),
             *_of_contact(model, statistics.unresolved, largest),
             *folded(model, simulator._state),
         ],

@@ -1,5 +1,7 @@
 """Figures of a run are those of the run: extremes over its start and the ends of all its steps."""
 
+import re
+
 import numpy as np
 import pytest
 from support.sample_scenes import GEL, ball, fixed, layer, rod, scene
@@ -137,6 +139,29 @@ def test_the_outermost_fibre_in_pure_bending_strains_by_half_thickness_times_cur
     assert found["max_fibre_strain"] == pytest.approx(1e-3 * found["max_curvature"], rel=1e-6)
     assert found["max_strain"] < 1e-7
     assert not found["warnings"]
+
+
+@pytest.mark.parametrize("width", [0.02, 0.04])
+def test_a_beam_that_loads_bend_where_a_plate_is_stiffer_is_told_by_how_much(width):
+    def simulated(turn, model="laminate", **more):
+        simulator = Simulator(load_scene(bent(turn, thickness=1e-3, width=width, **more)), model=model, dimension=2)
+        simulator.solve_static()
+        return simulator
+
+    turns = {}
+    for section in ("strip", "beam"):
+        simulator = simulated(2.0, section=section)
+        turns[section] = simulator.curvatures[13] / 40.0
+        assert "loads bend" not in str(simulator.summary()["warnings"])
+    stiffer = turns["beam"] / turns["strip"]
+    (told,) = simulated(2.0 / stiffer, section="auto").summary()["warnings"]  # as far as the strip
+    found = re.match(r"rods\.rod: loads bend it to w²κ/H (\d+), where a plate as wide is stiffer by (\d+) %", told)
+    assert float(found[1]) == pytest.approx(width**2 * 40.0 / stiffer / 1e-3, rel=0.03)
+    assert float(found[2]) == pytest.approx(100.0 * (stiffer - 1.0), abs=1.0)
+    assert told.endswith("can be had by `section: strip`; `section: beam` says that a beam is meant")
+    (told,) = simulated(2.0 / stiffer, model="two_rod", section="auto").summary()["warnings"]
+    assert "a strip takes the model laminate" in told
+    assert not simulated(0.01, section="auto").summary()["warnings"]
 
 
 def test_bending_beyond_the_limits_of_a_thin_rod_is_warned_of_and_an_event_once():

@@ -148,6 +148,8 @@ class RunExtrema:
     voronoi_length: Vector  # of bending elements [m], shape (n_bend,)
     faces: Matrix  # heights of both faces over the curve at bending elements [m], shape (n_bend, 2)
     thickness: Vector  # of the whole section there [m], shape (n_bend,)
+    plate: Vector  # by which curvature makes 1 where a plate would be too stiff, see `model.bent_plates` [m], likewise
+    free: Vector  # curvature beyond their rest that is not by loads [1/m], likewise
     height: float = CHANGES  # greatest of the rods' mass centre [m]
     least_gap: float = CHANGES  # [m]
     contact_force: float = CHANGES  # largest on a node [N]
@@ -155,6 +157,8 @@ class RunExtrema:
     strain: float = CHANGES
     fibre_strain: float = CHANGES
     curvature_by_thickness: float = CHANGES
+    bent_plate: float = CHANGES  # greatest product of `plate` and the curvature that loads make
+    most_bent: int = CHANGES  # where
     put_in: float = CHANGES  # energy that steps supplied [J]
     taken_out: float = CHANGES  # and lost
     body_top: Vector = ("body",)  # greatest height of each body's position [m]
