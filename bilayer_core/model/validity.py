@@ -11,6 +11,7 @@ from bilayer_core.model.edge_figures import EdgeFigures, edge_figures
 from bilayer_core.model.findings import Figure
 from bilayer_core.model.strip_choice import plate_figures
 from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.profile import extremes
 from bilayer_core.scene.rod import Rod
 
 LARGE_STRAIN = 0.1  # linear elasticity and the rectangular section lose meaning
@@ -36,6 +37,8 @@ def validity_figures(scene: SceneConfig, model: str = "laminate") -> Iterator[Fi
         yield from plate_figures(scene, rod, at_edges, model)
         yield from diffusion_figures(scene, rod)
     if scene.contact is not None:
+        if model == "laminate":
+            yield from _of_widths(scene)
         yield _of_barrier(*min(thinnest.items(), key=lambda item: item[1]), scene.contact.barrier_distance)
 
 
@@ -92,6 +95,23 @@ def _of_shear(rod: Rod, at_edges: EdgeFigures) -> Iterator[Figure]:
             share / SHEAR,
             "a rod does not shear, so it is computed that much too stiff",
         )
+
+
+def _of_widths(scene: SceneConfig) -> Iterator[Figure]:
+    """Yield the figures of rods whose layers are of unlike width, which contact of a laminate does not see."""
+    for rod in scene.rods:
+        widths = [extremes(rod.width_of(layer)) for layer in rod.layers]
+        least, most = min(width[0] for width in widths), max(width[1] for width in widths)
+        beyond, distance = 0.5 * (most - least), scene.contact.barrier_distance
+        if any(layer.width is not None for layer in rod.layers) and beyond > distance:
+            yield Figure(
+                f"rods.{rod.name}.layers",
+                "are",
+                f"{1e3 * least:.3g} to {1e3 * most:.3g} mm wide",
+                "alike within twice the barrier distance",
+                beyond / distance,
+                "contact takes them as one rectangle as wide as the widest; two_rod takes the width of each",
+            )
 
 
 def _of_barrier(name: str, thin: float, distance: float) -> Figure:

@@ -98,6 +98,16 @@ def test_the_warning_is_given_beyond_the_limit_and_not_within(case):
     assert [figure.outside for figure in same] == ([] if case == "shear" else [""])  # which is told from its limit on
 
 
+@pytest.mark.parametrize(("narrow", "told"), [(3.8e-3, 0), (3.7e-3, 1)])
+def test_layers_of_unlike_width_in_contact_are_told_of_a_laminate_alone(narrow, told):
+    content = bilayer(contact=contact(barrier_distance=1.1e-4))
+    content["rods"][0]["layers"][0]["width"] = narrow  # the other has 4 mm
+    text = "rods.rod.layers: are 3.7 to 4 mm wide (alike within twice the barrier distance): contact takes them as one"
+    for model, times in (("laminate", told), ("two_rod", 0)):
+        found = [str(figure) for figure in validity_warnings(load_scene(content), model)]
+        assert len(found) == times and all(line.startswith(text) for line in found)
+
+
 def told(layers, **more):
     """Figures of a rod of these layers without contact, as one text."""
     settings = {"length": 0.1, "width": 0.001, "stations": 51} | more
