@@ -36,7 +36,7 @@ from __future__ import annotations
 import math
 
 from bilayer_core.jit import kernel, piece, record
-from bilayer_core.jit.record import Vector
+from bilayer_core.jit.record import Matrix, Vector
 from bilayer_core.kinematics.vector import angle, dot, row
 from bilayer_core.model.plate_strip import TERMS
 from bilayer_core.model.records.parts import Flattening
@@ -101,22 +101,6 @@ def flatness(series, i, offset, x):
     return value, sign * first, -(g2 + 2.0 * value + 4.0 * t * first) / z
 
 
-@record
-class Flatness:
-    """φ of each strip joint."""
-
-    x: Vector
-    value: Vector
-
-
-@piece(int, Flattening, Flatness)
-def write_flatness(flattening, of):
-    """Write φ for those who look at sections between steps."""
-    for i in range(of.x.shape[0]):
-        of.value[i] = flatness(flattening.series, i, flattening.offset[i], of.x[i])[0]
-    return 0
-
-
 @kernel
 def strip_law(flattening, rest, i, k, kappa, psi):
     """Return F of strip joint i, which is joint k [J], at the strains without stress `rest` (`Stage.rest_joint`), its
@@ -140,6 +124,27 @@ def strip_law(flattening, rest, i, k, kappa, psi):
         sn * kappa * phi,
         s * kappa * kappa * phi,
     )
+
+
+@record
+class Sections:
+    """The law of each strip joint at given strains."""
+
+    rest: Matrix  # `Stage.rest_joint`
+    kappa: Vector  # κ₁, shape (n_strip_joint,)
+    psi: Vector  # ψ, likewise
+    pull: Vector  # ∂F/∂κ̄y Δl [N m], likewise
+    tangent: Matrix  # ∂²F/∂κ₁², ∂²F/∂κ₁∂ψ and ∂²F/∂ψ² [N m], shape (n_strip_joint, 3)
+
+
+@piece(int, Flattening, Sections)
+def write_sections(flattening, of):
+    """Write the law for those who look at sections between steps."""
+    for i in range(of.kappa.shape[0]):
+        _, _, _, k11, k13, k33, pull, _ = strip_law(flattening, of.rest, i, flattening.joint[i], of.kappa[i], of.psi[i])
+        of.pull[i] = pull
+        of.tangent[i, 0], of.tangent[i, 1], of.tangent[i, 2] = k11, k13, k33
+    return 0
 
 
 @kernel

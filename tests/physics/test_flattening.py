@@ -17,7 +17,7 @@ from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_core.log.run.memory import MemoryRecorder
 from bilayer_core.model.build_model import build_model
 from bilayer_core.model.plate_strip import flattening_series
-from bilayer_core.simulation.strip_sections import folded
+from bilayer_core.simulation.strip_sections import shapes
 from bilayer_core.view.colouring import choose_colouring
 
 TABLE = {
@@ -260,22 +260,71 @@ def test_a_strip_that_folds_at_rest_is_refused_since_the_mesh_would_say_where():
         swollen(100.0, 0.5, dimension=2, values=(0.1, 0.2, 0.3))
 
 
-def test_a_run_warns_of_a_strip_of_which_a_part_curls_along_and_a_part_across():
-    curvature = 36.0 * THICKNESS / WIDTH**2
-    law = {"stimulus": "heat", "gain": curvature * THICKNESS / 1.5}
+def free_strip(ratio, stations, swelling=(0.0, 1.0)):
+    """A simulator of a strip clamped at its start that swells in two seconds, on a part of it."""
+    law = {"stimulus": "heat", "gain": ratio * (THICKNESS / WIDTH) ** 2 / 1.5}
+    if swelling != (0.0, 1.0):
+        law["interval"] = [0.2 * end for end in swelling]
     half = {"thickness": 0.5 * THICKNESS}
     layers = [layer("bottom", eigenstrain=law, **half), layer("top", **half)]
-    heat = {"heat": {"schedule": {"type": "hold", "value": 1}}}
-    strip = rod(layers, length=0.2, stations=21, width=WIDTH) | {"section": "strip"}
-    simulator = Simulator(load_scene(scene([strip], stimuli=heat)), model="laminate")
-    assert list(folded(simulator.model, simulator._state)) == []  # flat: all of it rolls up across
-    angle = np.repeat([0.0, 1.3 * curvature * 0.01], 10) * np.arange(20)
+    strip = rod(layers, length=0.2, stations=stations, width=WIDTH, clamp_start="wall") | {"section": "strip"}
+    ramp = {"type": "ramp", "start": 0.0, "end": 2.0, "from": 0.0, "to": 1.0}
+    content = scene(
+        [strip],
+        {"tolerance": 1e-3, "dimension": 2},
+        bodies=[fixed()],
+        materials={"gel": {**GEL, "poisson_ratio": 0.5, "retardation_time": 0.05}},
+        stimuli={"heat": {"schedule": ramp}},
+        duration=4.0,
+    )
+    return Simulator(load_scene(content), model="laminate")
+
+
+@pytest.mark.parametrize("stations", [21, 41, 81])
+def test_a_run_stops_when_a_strip_folds_since_the_mesh_would_say_where(stations):
+    simulator = free_strip(36.0, stations)
+    with pytest.raises(SimulationError, match=r"rods\.rod folds: .* a slower stimulus, less of it"):
+        simulator.run()
+    assert 0.5 < simulator.time < 2.0 and simulator.termination == "failed"
+
+
+def test_strips_that_swell_less_than_they_may_or_only_in_part_do_not_fold():
+    for strip in (free_strip(8.0, 41), free_strip(8.0, 41, (0.0, 0.52))):
+        strip.run()
+        assert shapes(strip.model, strip._state) == {"rod": "curled along"}
+
+
+def test_a_strip_of_which_a_part_curls_along_and_a_part_across_has_folded():
+    simulator = free_strip(36.0, 21)
+    simulator.set_stimulus("heat", 1.0)
+    state, curvature = simulator._state, 36.0 * THICKNESS / WIDTH**2
+    assert simulator.solve_static().strips == {"rod": "rolled across"}
+    angle = 1.3 * curvature * 0.01 * np.maximum(np.arange(20) - 9, 0)
     turned = np.stack([np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1)
-    simulator._state.position[1:] = simulator._state.position[0] + np.cumsum(0.01 * turned, axis=0)
-    simulator._state.director1[:] = turned[:, [2, 1, 0]] * [-1.0, 0.0, 1.0]
-    (warning,) = folded(simulator.model, simulator._state)
-    assert "rods.rod has folded" in warning
-    assert warning in simulator.summary()["warnings"]
+    state.position[1:] = state.position[0] + np.cumsum(0.01 * turned, axis=0)
+    state.director1[:] = turned[:, [2, 1, 0]] * [-1.0, 0.0, 1.0]
+    assert shapes(simulator.model, state) == {"rod": "folded"}
+
+
+@pytest.mark.parametrize("stations", [33, 65])
+@pytest.mark.parametrize(("width", "shape"), [(0.1 / 12, {}), (0.1 / 4, {"rod": "creased"})])
+def test_a_wide_ribbon_sheared_sideways_creases_and_its_run_warns(stations, width, shape):
+    ways = [[0.0, 0.0, 0.0], [-0.025, 0.0, 0.0], [-0.025, 0.045, 0.0]]
+    motion = {"type": "prescribed", "times": [0.0, 1.0, 2.0], "displacements": ways}
+    imperfection = {"shape": "bow", "size": 1e-4}
+    ends = {"clamp_start": "wall", "clamp_end": "moved", "imperfection": imperfection}
+    content = scene(
+        [rod([layer()], 0.1, stations, width=width, section="strip", **ends)],
+        {"tolerance": 1e-3, "dimension": 3},
+        bodies=[fixed(), {"name": "moved", "position": [0.1, 0.0, 0.0], "motion": motion}],
+        materials={"gel": {**GEL, "poisson_ratio": 0.5, "retardation_time": 1e-2}},
+        duration=2.0,
+    )
+    simulator = Simulator(load_scene(content), model="laminate")
+    simulator.run()
+    assert shapes(simulator.model, simulator._state) == shape
+    told = [warning for warning in simulator.summary()["warnings"] if "rods.rod is creased from t = 1." in warning]
+    assert len(told) == len(shape)
 
 
 @pytest.mark.parametrize(("swelling", "wanted"), [("along", 1.0), ("across", 0.0)])
