@@ -26,7 +26,9 @@ and ψ = τ Δl, with x = √Λ κ₁ and φ = (1 − g)/x², there is
     s = (1 − β²) w⁵ Ẽ/(4 Δl³),   Λ = w⁴ Ẽ/(4 D₂₂ Δl²)
 
 N is a polynomial and φ is analytic, φ(0; β) = 1/180, so that nothing is special at κ = 0, where τ²/κ is infinite. θ₀
-belongs to a strip that is twisted at the start: its middle surface has the metric of that shape.
+belongs to a strip that is twisted at the start: its middle surface has the metric of that shape. Ẽ, D₂₂ and κ̄x are
+those of the section about its own neutral axis. Where the curve is off it, a joint's κ̄₁ is that at the strain 0 of the
+curve (`model.laminate_section`), and κ̄y Δl has a₁ (κ̄x Δl − κ̄₁) with it.
 
 φ is the quotient of two entire series (`model.plate_strip.flattening_series`) up to |x| = 32, from where on g is used.
 """
@@ -150,10 +152,10 @@ def write_sections(flattening, of):
 @kernel
 def pull_of_rest(p, at, stage):
     """Write the derivatives of bending, twist and F of strips by values of `Stage.rest_joint`, and the second by κ̄y Δl,
-    at a configuration as it is.
+    at a configuration as it is, of which `bend_by_strains` has written what strains of edges bend.
     """
     strands, flattening, rest = p.strands, p.flattening, stage.rest_joint
-    stiffness, pull_out = strands.joint_stiffness, flattening.pull
+    stiffness, pull_out, stretches = strands.joint_stiffness, flattening.pull, p.off_axis.exists
     for i in range(flattening.joint.shape[0]):
         k, coupling = flattening.joint[i], flattening.coupling[i]
         ka, kb = strands.joint_a[k], strands.joint_b[k]
@@ -164,7 +166,7 @@ def pull_of_rest(p, at, stage):
             m2a = row(at.director2, ka)
             psi = angle(dot(m1a, m1b) - p1 * q1 * ic, dot(m2a, m1b) - dot(b, m2a) * q1 * ic)
             psi += TWO_PI * math.floor((at.joint_strain[k, 2] - psi) / TWO_PI + 0.5)
-        d1, d3 = kappa - rest[k, 0], psi - rest[k, 2]
+        d1, d3 = kappa - (p.off_axis.rest[k, 0] if stretches else rest[k, 0]), psi - rest[k, 2]
         _, _, _, _, _, _, pull, slope = strip_law(flattening, rest, i, k, kappa, psi)
         pull_out[flattening.first + i, 0] = pull
         pull_out[k, 0] = flattening.curl[i] * pull - coupling * d3 - stiffness[k, 0] * d1

@@ -26,6 +26,7 @@ THIN = 2.0
 BROADEST = 100.0
 """w²κ/H up to which strips are asked whether they fold."""
 BISECTIONS = 20
+PLATES = "of fibres or of unlike poisson_ratio"
 HELD = 0.2
 """Part of a strip within one width from its clamps that counts."""
 
@@ -80,15 +81,17 @@ def refusal(scene: SceneConfig, rod: Rod) -> str:
             return f"needs layers of one width, that of the rod, and {layer.name} has a `width`"
         if layer.stiffness_change is not None:
             return f"needs layers whose moduli stay, and {layer.name} has a `stiffness_change`"
-        if layer.interval is not None:
-            return f"needs layers that cover all of it, and {layer.name} has an `interval`"
         if layer.natural_twist != 0.0:
             return f"takes its twist from its path, and {layer.name} has a `natural_twist`"
-        if layer.natural_curvature is not None and is_plate(scene, rod):
-            return f"of fibres or of unlike poisson_ratio takes no `natural_curvature`, and {layer.name} has one"
+        if not is_plate(scene, rod):
+            continue
+        if layer.natural_curvature is not None:
+            return f"{PLATES} takes no `natural_curvature`, and {layer.name} has one"
+        if layer.interval is not None:
+            return f"{PLATES} needs layers that cover all of it, and {layer.name} has an `interval`"
         for key in ("thickness", "stiffness"):
             if isinstance(getattr(layer, key), Profile):
-                return f"needs one {key} all along it, and that of {layer.name} is a profile"
+                return f"{PLATES} needs one {key} all along it, and that of {layer.name} is a profile"
     return ""
 
 

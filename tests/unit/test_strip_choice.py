@@ -36,7 +36,8 @@ def chosen(**how):
         ({"swelling": "along"}, "strip"),  # its curvature is that of a beam, its stiffness is not
         ({"swelling": "across", "width": 1e-3}, "strip"),  # which a beam does not feel
         ({"section": "beam"}, "beam"),
-        ({"more": {"interval": [0, 0.1]}}, "beam"),
+        ({"more": {"interval": [0, 0.1]}}, "strip"),
+        ({"more": {"natural_twist": 2.0}}, "beam"),
         ({"coupling": {"translation": 5.0}}, "beam"),
     ],
 )
@@ -76,14 +77,19 @@ def test_the_width_from_which_on_strips_fold_is_that_of_the_plate():
     ("more", "reason"),
     [
         ({"interval": [0, 0.1]}, "needs layers that cover all of it, and q has an `interval`; allowed: beam"),
-        ({"natural_twist": 2.0}, "takes its twist from its path, and q has a `natural_twist`"),
         ({"thickness": {"at": [0, 0.2], "value": [0.2e-3, 0.3e-3]}}, "needs one thickness all along it"),
         ({"stiffness": {"at": [0, 0.2], "value": [1, 2]}}, "needs one stiffness all along it"),
     ],
 )
-def test_a_strip_that_cannot_be_computed_is_refused_with_the_reason(more, reason):
-    with pytest.raises(SceneError, match=reason):
-        Simulator(load_scene(wide("strip", more=more)))
+def test_a_strip_with_fibres_that_cannot_be_computed_is_refused_with_the_reason(more, reason):
+    with pytest.raises(SceneError, match=f"strip of fibres or of unlike poisson_ratio {reason}"):
+        Simulator(load_scene(wide("strip", more={**more, "fibres": {"angle": 0.5}})))
+    Simulator(load_scene(wide("strip", more=more)))
+
+
+def test_a_strip_takes_its_twist_from_its_path():
+    with pytest.raises(SceneError, match="takes its twist from its path, and q has a `natural_twist`"):
+        Simulator(load_scene(wide("strip", more={"natural_twist": 2.0})))
 
 
 def test_round_rods_are_no_strips():
@@ -133,7 +139,7 @@ def test_a_beam_whose_layers_swell_along_it_alone_is_told_its_stiffness_and_no_c
     assert not any("swelling alike" in what for what in told)
 
 
-PART = {"more": {"interval": [0, 0.1]}}
+TWISTED = {"more": {"natural_twist": 2.0}}
 
 
 @pytest.mark.parametrize(
@@ -142,7 +148,7 @@ PART = {"more": {"interval": [0, 0.1]}}
         ({}, "auto", ""),
         ({"section": "beam"}, "auto", ""),
         ({}, "two_rod", "model laminate"),
-        (PART, "auto", "interval"),
+        (TWISTED, "auto", "natural_twist"),
     ],
 )
 def test_a_run_warns_of_a_wide_rod_that_cannot_be_a_strip(how, model, warned):
