@@ -237,7 +237,7 @@ class WholeSection:
         coupling = sum(layer.stretch * layer.height for layer in layers)
         bending = sum(layer.bend + layer.stretch * layer.height**2 for layer in layers)
         coupling = np.where(np.abs(coupling) <= ON_AXIS * np.sqrt(stretch * bending), 0.0, coupling)
-        growth = (1.0, 1.0, 1.0, 1.0) if plate is None else plate.growth
+        growth = (1.0, 1.0, 1.0) if plate is None else plate.growth
         if plate is not None:  # whose curve is where it does not couple
             stretch, coupling, bending = growth[0] * stretch, 0.0 * coupling, growth[1] * bending
         self._of_cells = stretch, coupling, bending

@@ -1,15 +1,15 @@
 """Which rods are strips, by how much that differs from a beam, and what cannot be a strip."""
 
-import math
-
 import pytest
-from support.sample_scenes import GROUND, contact, layer, rod, scene
+from support.sample_scenes import GEL, GROUND, contact, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SceneError
 from bilayer_core.model.edge_figures import edge_figures
 from bilayer_core.model.plan import simplest_model
-from bilayer_core.model.strip_choice import departure, folding_ratio, plates, section_of
+from bilayer_core.model.plate_section import plate_section
+from bilayer_core.model.plate_strip import folding_ratio
+from bilayer_core.model.strip_choice import departure, law_of, plates, section_of
 from bilayer_core.model.validity import validity_figures
 
 HEAT = {"heat": {"schedule": {"type": "hold", "value": 1}}}
@@ -66,11 +66,27 @@ def test_the_height_of_a_section_is_what_layers_that_swell_across_make_of_it():
     assert heights == {"across": ["2.25 mm across"], "along": [], "isotropic": ["0.205 mm across"]}
 
 
-def test_the_width_from_which_on_strips_fold_is_that_of_the_plate():
-    assert folding_ratio(0.5) == pytest.approx(8.7, abs=0.1)
-    assert folding_ratio(0.3) == pytest.approx(10.7, abs=0.1)
-    assert folding_ratio(0.0) > folding_ratio(0.1)
-    assert not math.isnan(folding_ratio(-0.5))
+@pytest.mark.parametrize(("poisson", "ratio"), [(0.5, 8.7), (0.3, 10.7)])
+def test_the_width_from_which_on_strips_fold_is_that_of_the_plate(poisson, ratio):
+    gel = {"gel": {**GEL, "poisson_ratio": poisson}}
+    loaded = load_scene(wide(materials=gel))
+    assert folding_ratio(law_of(loaded, loaded.rods[0])) == pytest.approx(ratio, abs=0.1)
+
+
+def test_the_height_and_the_fold_of_layers_of_unlike_ratio_are_those_of_their_own_law():
+    gels = {name: {**GEL, "poisson_ratio": ratio} for name, ratio in (("low", 0.1), ("high", 0.49))}
+    content = wide("strip", materials=gels, contact=contact(2e-4), obstacles=[GROUND | {"point": [0, 0, -1]}])
+    for own, name in zip(content["rods"][0]["layers"], gels, strict=True):
+        own["material"] = name
+    loaded = load_scene(content)
+    law, told = law_of(loaded, loaded.rods[0]), {figure.what: figure for figure in validity_figures(loaded)}
+    limit = folding_ratio(law)
+    assert law.folds(1.01 * limit) and not law.folds(0.99 * limit)
+    assert f"at most {limit:.3g} (" in told["as a strip it swells up to w²κ/H of"].limit
+    natural = plate_section(loaded, loaded.rods[0]).natural(1)
+    assert natural.across == pytest.approx(natural.along, rel=1e-12)
+    height = 0.006667 * abs(natural.across) * 0.03**2 / 8.0
+    assert told["its section rises by"].value == f"{1e3 * height:.3g} mm across"
 
 
 @pytest.mark.parametrize(
