@@ -20,7 +20,7 @@ from bilayer_core.engine.step import treat_state, write_rest_strains
 from bilayer_core.forces.added_mass import fluid_momentum
 from bilayer_core.forces.bend_twist import add_bending, add_bending_of_strips
 from bilayer_core.forces.contact_on_bodies import add_contact_to_bodies
-from bilayer_core.forces.flattening import write_flatness
+from bilayer_core.forces.flattening import write_sections
 from bilayer_core.forces.force_register import TERMS
 from bilayer_core.forces.planar import add_elasticity_in_plane, add_elasticity_of_strips_in_plane
 from bilayer_core.forces.rod_contact import bound_between_rods, find_rod_contacts
@@ -62,7 +62,7 @@ def needed_pieces(model: Model) -> frozenset[str]:
         [of for of_kind, of in ELASTICITY.items() if of_kind != (model.plane.exists, model.flattening.exists)],
     )
     left_out = {of.name for pieces in unused for of in pieces}
-    waiting = [integrate, treat_state, write_rest_strains, *([write_flatness] if model.flattening.exists else [])]
+    waiting = [integrate, treat_state, write_rest_strains, *([write_sections] if model.flattening.exists else [])]
     for term in TERMS:
         if set(term.names) & set(model.forces):
             pieces = (term.add, term.start, term.update_lagged, term.settle, term.end)

@@ -26,7 +26,9 @@ and ψ = τ Δl, with x = √Λ κ₁ and φ = (1 − g)/x², there is
     s = (1 − β²) w⁵ Ẽ/(4 Δl³),   Λ = w⁴ Ẽ/(4 D₂₂ Δl²)
 
 N is a polynomial and φ is analytic, φ(0; β) = 1/180, so that nothing is special at κ = 0, where τ²/κ is infinite. θ₀
-belongs to a strip that is twisted at the start: its middle surface has the metric of that shape.
+belongs to a strip that is twisted at the start: its middle surface has the metric of that shape. Ẽ, D₂₂ and κ̄x are
+those of the section about its own neutral axis. Where the curve is off it, a joint's κ̄₁ is that at the strain 0 of the
+curve (`model.laminate_section`), and κ̄y Δl has a₁ (κ̄x Δl − κ̄₁) with it.
 
 φ is the quotient of two entire series (`model.plate_strip.flattening_series`) up to |x| = 32, from where on g is used.
 """
@@ -36,7 +38,7 @@ from __future__ import annotations
 import math
 
 from bilayer_core.jit import kernel, piece, record
-from bilayer_core.jit.record import Vector
+from bilayer_core.jit.record import Matrix, Vector
 from bilayer_core.kinematics.vector import angle, dot, row
 from bilayer_core.model.plate_strip import TERMS
 from bilayer_core.model.records.parts import Flattening
@@ -101,22 +103,6 @@ def flatness(series, i, offset, x):
     return value, sign * first, -(g2 + 2.0 * value + 4.0 * t * first) / z
 
 
-@record
-class Flatness:
-    """φ of each strip joint."""
-
-    x: Vector
-    value: Vector
-
-
-@piece(int, Flattening, Flatness)
-def write_flatness(flattening, of):
-    """Write φ for those who look at sections between steps."""
-    for i in range(of.x.shape[0]):
-        of.value[i] = flatness(flattening.series, i, flattening.offset[i], of.x[i])[0]
-    return 0
-
-
 @kernel
 def strip_law(flattening, rest, i, k, kappa, psi):
     """Return F of strip joint i, which is joint k [J], at the strains without stress `rest` (`Stage.rest_joint`), its
@@ -142,13 +128,34 @@ def strip_law(flattening, rest, i, k, kappa, psi):
     )
 
 
+@record
+class Sections:
+    """The law of each strip joint at given strains."""
+
+    rest: Matrix  # `Stage.rest_joint`
+    kappa: Vector  # κ₁, shape (n_strip_joint,)
+    psi: Vector  # ψ, likewise
+    pull: Vector  # ∂F/∂κ̄y Δl [N m], likewise
+    tangent: Matrix  # ∂²F/∂κ₁², ∂²F/∂κ₁∂ψ and ∂²F/∂ψ² [N m], shape (n_strip_joint, 3)
+
+
+@piece(int, Flattening, Sections)
+def write_sections(flattening, of):
+    """Write the law for those who look at sections between steps."""
+    for i in range(of.kappa.shape[0]):
+        _, _, _, k11, k13, k33, pull, _ = strip_law(flattening, of.rest, i, flattening.joint[i], of.kappa[i], of.psi[i])
+        of.pull[i] = pull
+        of.tangent[i, 0], of.tangent[i, 1], of.tangent[i, 2] = k11, k13, k33
+    return 0
+
+
 @kernel
 def pull_of_rest(p, at, stage):
     """Write the derivatives of bending, twist and F of strips by values of `Stage.rest_joint`, and the second by κ̄y Δl,
-    at a configuration as it is.
+    at a configuration as it is, of which `bend_by_strains` has written what strains of edges bend.
     """
     strands, flattening, rest = p.strands, p.flattening, stage.rest_joint
-    stiffness, pull_out = strands.joint_stiffness, flattening.pull
+    stiffness, pull_out, stretches = strands.joint_stiffness, flattening.pull, p.off_axis.exists
     for i in range(flattening.joint.shape[0]):
         k, coupling = flattening.joint[i], flattening.coupling[i]
         ka, kb = strands.joint_a[k], strands.joint_b[k]
@@ -159,7 +166,7 @@ def pull_of_rest(p, at, stage):
             m2a = row(at.director2, ka)
             psi = angle(dot(m1a, m1b) - p1 * q1 * ic, dot(m2a, m1b) - dot(b, m2a) * q1 * ic)
             psi += TWO_PI * math.floor((at.joint_strain[k, 2] - psi) / TWO_PI + 0.5)
-        d1, d3 = kappa - rest[k, 0], psi - rest[k, 2]
+        d1, d3 = kappa - (p.off_axis.rest[k, 0] if stretches else rest[k, 0]), psi - rest[k, 2]
         _, _, _, _, _, _, pull, slope = strip_law(flattening, rest, i, k, kappa, psi)
         pull_out[flattening.first + i, 0] = pull
         pull_out[k, 0] = flattening.curl[i] * pull - coupling * d3 - stiffness[k, 0] * d1

@@ -1,7 +1,7 @@
 """How much stiffer a plate as wide as a beam would be, when loads bend the beam during a run.
 
 A plate that is bent flattens across, the more so the larger w²κ/H, and is stiffer for it by up to ν²/(1 − ν²)
-(`model.plate_strip.bent_stiffness`). Before a run nobody knows how far loads will bend a rod.
+(`StripLaw.bent_stiffness`). Before a run nobody knows how far loads will bend a rod.
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import numpy as np
 from bilayer_core.model.bend_faces import whole_section
 from bilayer_core.model.edge_figures import edge_figures
 from bilayer_core.model.model import Model
-from bilayer_core.model.plate_strip import bent_stiffness
-from bilayer_core.model.strip_choice import PLATE, refusal, stiff_ratio
+from bilayer_core.model.plate_strip import stiff_ratio
+from bilayer_core.model.strip_choice import PLATE, law_of, refusal
 from bilayer_core.scene.rod import Rod
 
 Array = np.ndarray
@@ -28,7 +28,7 @@ def _rods(model: Model) -> dict[str, Rod]:
 
 
 def _limit(model: Model, rod: Rod) -> float:
-    return stiff_ratio(edge_figures(model.scene, rod).poisson_ratio)
+    return stiff_ratio(law_of(model.scene, rod), PLATE)
 
 
 def plates_of_bends(model: Model) -> tuple[Array, Array]:
@@ -62,7 +62,7 @@ def bent_plate(model: Model, kind: str, times_limit: float, joint: int) -> str:
     (name,) = (s.rod for s in model.strands if s.first_node <= node < s.first_node + s.node_count)
     rod = _rods(model)[name]
     ratio = times_limit * _limit(model, rod)
-    stiffer = float(bent_stiffness(ratio, edge_figures(model.scene, rod).poisson_ratio)) - 1.0
+    stiffer = float(law_of(model.scene, rod).bent_stiffness(ratio)) - 1.0
     cure = "takes the model laminate" if kind == "two_rod" else "can be had by `section: strip`"
     why = refusal(model.scene, rod) or cure
     return (

@@ -172,12 +172,14 @@ def _drives(found: Collected) -> Drives:
     rest, strips = _of_joints(found, "joint_rest", width=3), found.column("strip_joint", np.int64)
     curled = len(rest) + np.searchsorted(strips, found.column("curled_joint", np.int64))
     driven, twisted = (found.column(f"{name}_joint", np.int64) for name in ("driven", "twisted"))
+    curled_at_rest = np.zeros((len(strips), 3))
+    curled_at_rest[:, 0] = found.column("strip_rest")
     multiples = np.zeros((len(found.moduli) + 1 if found.moduli else 0, 3))
     multiples[:, 0] = 1.0
     changed = len(rest) + len(strips) + np.arange(len(found.moduli))
     return Drives(
         rest_strain=found.column("rest_strain"),
-        joint_rest=np.concatenate([rest, np.zeros((len(strips), 3)), multiples]),
+        joint_rest=np.concatenate([rest, curled_at_rest, multiples]),
         driven_edge=found.column("driven_edge", np.int64),
         driven_law=found.column("driven_law", np.int64),
         driven_weight=found.column("driven_weight"),

@@ -57,8 +57,6 @@ class EdgeFigures:
         Least and largest, likewise, shape (2, n_layer, n_edge).
     multiple_range : ndarray
         Least and largest multiple of each layer's moduli over its channel's range, shape (2, n_layer).
-    poisson_ratio : float
-        Of its layers, mean by thickness.
     """
 
     def __init__(self, scene: SceneConfig, rod: Rod):
@@ -85,8 +83,7 @@ class EdgeFigures:
             ends = along * np.stack([ranges[:, 1].min(axis=0), ranges[:, 2].max(axis=0)])
             self.eigenstrain_range[:, index] = np.sort(ends, axis=0)
         self.thickness = self._layers.sum(axis=0)
-        ratios = np.array([scene.materials[layer.material].poisson_ratio for layer in rod.layers])
-        self.poisson_ratio = float(ratios @ self._layers.sum(axis=1) / self._layers.sum())
+        self._poisson = scene.materials[rod.layers[0].material].poisson_ratio  # of the one layer of a round rod
         along = rod.edge_length * stations
         self._path = rod.curvatures_at(along)[:, 0]
         self._natural = np.array(
@@ -143,7 +140,7 @@ class EdgeFigures:
         EI/(k GA) with Cowper's k = 6 (1 + ν)(1 + m²)²/((7 + 6ν)(1 + m²)² + (20 + 12ν) m²), m = r/R (1966).
         """
         if self._hole is not None:
-            nu, m = self.poisson_ratio, self._hole
+            nu, m = self._poisson, self._hole
             whole = (1.0 + m**2) ** 2
             second_over_area = self.width**2 * (1.0 + m**2) / 16.0
             k = 6.0 * (1.0 + nu) * whole / ((7.0 + 6.0 * nu) * whole + (20.0 + 12.0 * nu) * m**2)

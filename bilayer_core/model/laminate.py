@@ -120,7 +120,7 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
     found.path_height += [path] * len(copies)
     joints = add_strands(found, scene, rod, strands, shape, elements, body_index)
     if strip:
-        _add_strip_joints(found, scene.materials[rod.layers[0].material].poisson_ratio, plate, joints, shape)
+        _add_strip_joints(found, scene.materials[rod.layers[0].material].poisson_ratio, plate, whole, joints, shape)
     coupling = whole.strain_coupling()
     coupled = coupling.any(axis=-1) & (joints >= 0)
     found.add(coupled_joint=joints[coupled], strain_coupling=coupling[coupled])
@@ -129,7 +129,12 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
 
 
 def _add_strip_joints(
-    found: Collected, poisson: float, plate: PlateSection | None, joints: Array, shape: StrandShape
+    found: Collected,
+    poisson: float,
+    plate: PlateSection | None,
+    whole: WholeSection,
+    joints: Array,
+    shape: StrandShape,
 ) -> None:
     """Add the joints of a strip, those of a plate or of layers with one Poisson's ratio; see `forces.flattening`."""
     there = joints >= 0
@@ -138,7 +143,8 @@ def _add_strip_joints(
     def of_joints(values: Array) -> Array:
         return np.broadcast_to(values, joints.shape)[there][order]
 
-    constants = {"curl": poisson, "plate": 1.0 / (1.0 - poisson**2), "membrane": 1.0, "offset": 0.0}
+    membrane, bending = whole.plates()
+    constants = {"curl": poisson, "plate": bending / (1.0 - poisson**2), "membrane": membrane, "offset": 0.0}
     turned = {"skew": 0.0, "coupling": 0.0}  # of the opposite sign in a mirror image
     if plate is not None:
         (along, both, _), (curl, skew) = plate.narrow, plate.across
@@ -148,6 +154,7 @@ def _add_strip_joints(
     found.add(
         strip_joint=of_joints(joints),
         strip_start=of_joints(shape.strains()[..., 2]),
+        strip_rest=of_joints(whole.curl_rest),
         **{f"strip_{name}": of_joints(np.array(value)) for name, value in constants.items()},
         **{f"strip_{name}": of_joints(value * handedness) for name, value in turned.items()},
     )

@@ -217,6 +217,8 @@ class WholeSection:
         A* [N] and N*/A* of edges, shape (n_copy, n_edge).
     joint_stiffness, joint_rest : Array
         [N m] and κ̄₁ κ̄₂ ψ̄ [rad] at all nodes, shape (n_copy, n_node, 3).
+    curl_rest : Array
+        ν (κ̄x Δl − κ̄₁) of strips [rad], see `driven`, shape (n_copy, n_node).
     """
 
     def __init__(
@@ -230,11 +232,12 @@ class WholeSection:
     ):
         self._rod, self._layers, self._plate, self._handedness = rod, layers, plate, shape.handedness
         self._cells, self._half_length = cells, 0.5 * shape.lengths[..., None]
+        self._poisson = scene.materials[rod.layers[0].material].poisson_ratio  # that of all layers of a strip
         stretch = sum(layer.stretch for layer in layers)
         coupling = sum(layer.stretch * layer.height for layer in layers)
         bending = sum(layer.bend + layer.stretch * layer.height**2 for layer in layers)
         coupling = np.where(np.abs(coupling) <= ON_AXIS * np.sqrt(stretch * bending), 0.0, coupling)
-        growth = (1.0, 1.0, 1.0, 1.0) if plate is None else plate.growth
+        growth = (1.0, 1.0, 1.0) if plate is None else plate.growth
         if plate is not None:  # whose curve is where it does not couple
             stretch, coupling, bending = growth[0] * stretch, 0.0 * coupling, growth[1] * bending
         self._of_cells = stretch, coupling, bending
@@ -249,7 +252,9 @@ class WholeSection:
         flexibility = [1.0 / bending, cells.means(1.0 / across), cells.means(1.0 / twist)]
         self.joint_stiffness = 1.0 / np.stack([self.to_nodes(part) for part in flexibility], axis=-1)
         self.joint_rest = shape.strains()
-        self.joint_rest[..., 0] += self.to_nodes(moment[1] / bending)
+        turned = self.to_nodes(moment[1] / bending)
+        self.joint_rest[..., 0] += turned
+        self.curl_rest = self._poisson * (self._bend_freely(*moment) - turned)
         self.joint_rest[..., 1] += self.to_nodes(cells.means(sum(layer.across_moment for layer in layers) / across))
         self.joint_rest[..., 2] += self.to_nodes(cells.means(sum(layer.twist_moment for layer in layers) / twist))
 
@@ -291,10 +296,25 @@ class WholeSection:
         pairs[:, 1:, 0], pairs[:, :-1, 1] = slope[..., 1], slope[..., 0]
         return pairs
 
+    def plates(self) -> tuple[Array, Array]:
+        """Return what a strip's joints have where no force acts along it, off the neutral axis too, over A* and over K:
+        A, and 1/Σ ℓ/(D − B²/A), shape (n_copy, n_node).
+        """
+        stretch, coupling, bending = self._of_halves
+        alone = self.to_nodes(1.0 / (bending - coupling**2 / stretch)) * self.joint_stiffness[..., 0]
+        return _between(stretch.mean(axis=-1)) / _between(self.axial_stiffness), 1.0 / alone
+
+    def _bend_freely(self, force: Array, moment: Array) -> Array:
+        """Return Σ ℓ (B N + A M)/(A D − B²) at nodes, the bend under what halves would bear at rest, where Σ ℓ M/D is
+        that at the curve's length [rad].
+        """
+        stretch, coupling, bending = self._of_halves
+        return self.to_nodes((coupling * force + stretch * moment) / (stretch * bending - coupling**2))
+
     def driven(self, slot: int, driven: Array, by_gradient: bool = False) -> tuple[Array, Array, Array, Array]:
         """Return what an eigenstrain 1 of a layer gives, by parts in cells, shape (n_cell,): rest strains N*/A* of all
         edges, shape (n_copy, n_edge), and of all nodes κ̄₁ (−Σ ℓ M/D in a beam), κ̄y Δl and ψ̄ [rad], shape (n_copy,
-        n_node).
+        n_node). κ̄y Δl has ν (κ̄x Δl − κ̄₁) with it, κ̄x of a strip without force: F takes κ̄₁ for κ̄x, see `plates`.
 
         By its gradient, the eigenstrain grows by 1 through the layer and is 0 on average: alone that would bend to
         −1/h, so M = −EI₁/h.
@@ -303,24 +323,33 @@ class WholeSection:
         if self._plate is not None:
             driven, natural = driven * layer.ratio, self._plate.natural(slot, by_gradient)
             stretch, _, bending = self._of_cells
-            strain, bend = self._driven_by(driven * stretch * natural.strain, driven * bending * natural.along)
+            strain, bend, _ = self._driven_by(driven * stretch * natural.strain, driven * bending * natural.along)
             length = self.to_nodes(self._cells.means(driven))
             twist = np.reshape(self._handedness, (-1, 1)) * length * natural.twist
             return strain, bend, length * natural.across, twist
         if by_gradient:
             moment = -driven * layer.ratio * layer.bend / self._rod.layers[slot].thickness
-            strain, bend = self._driven_by(0.0 * moment, moment)
+            strain, bend, free = self._driven_by(0.0 * moment, moment)
         else:
             axial = driven * layer.axial * np.ones_like(layer.ratio)
-            strain, bend = self._driven_by(axial, -axial * layer.height)
+            strain, bend, free = self._driven_by(axial, -axial * layer.height)
         along, across, _ = free_strain(self._rod.layers[slot])
-        return along * strain, along * bend, across * bend, 0.0 * bend
+        curl = across * free + self._poisson * along * (free - bend)
+        return along * strain, along * bend, curl, 0.0 * bend
 
-    def _driven_by(self, force: Array, moment: Array) -> tuple[Array, Array]:
-        """Return rest strains of edges and κ̄₁ of nodes from what layers would bear in cells at rest [N, N m]."""
+    def _driven_by(self, force: Array, moment: Array) -> tuple[Array, Array, Array]:
+        """Return rest strains of edges, and κ̄₁ and κ̄x Δl of nodes, from what layers would bear in cells at rest [N,
+        N m].
+        """
         force, moment = self._loads(force, moment)
         part = self._rest_strains(force, moment) / self.axial_stiffness
-        return part, self.to_nodes(moment / self._of_halves[2])
+        return part, self.to_nodes(moment / self._of_halves[2]), self._bend_freely(force, moment)
+
+
+def _between(edges: Array) -> Array:
+    """Return the means of edges before and after nodes, shape (n_copy, n_edge + 1)."""
+    padded = np.concatenate([edges[:, :1], edges, edges[:, -1:]], axis=1)
+    return 0.5 * (padded[:, 1:] + padded[:, :-1])
 
 
 def _at_nodes(of_halves: Array) -> Array:

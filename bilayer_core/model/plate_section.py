@@ -27,6 +27,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bilayer_core.model.plate_strip import StripLaw
 from bilayer_core.scene.config import Material, SceneConfig
 from bilayer_core.scene.profile import values_at
 from bilayer_core.scene.rod import Fibres, Layer, Rod
@@ -176,6 +177,12 @@ class PlateSection:
     def offset(self) -> float:
         """β."""
         return self._offset / float(np.sqrt(self.stretch * self.plate))
+
+    def bent(self, normal: bool) -> StripLaw:
+        """Return the law of a strip that is bent towards its normal, or away from it."""
+        slope = 0.5 * sum(self._thickness) * float(np.sqrt(self.stretch / self.plate))
+        across = float(self.bending[1, 1] / self.narrow[0])
+        return StripLaw(self.across[0], across, self.offset if normal else -self.offset, slope)
 
     def natural(self, slot: int, gradient: bool = False) -> Natural:
         """Return the free plate of an eigenstrain 1 of one layer, or of one that grows by 1 through its thickness and

@@ -1,16 +1,14 @@
 """Plates: the curvature and stiffness of strips so wide that their section bends, which that of a beam does not.
 
-In a strip of width w, thickness H and Poisson's ratio ν, curved by κ, the section bends to u(y): D u⁗ + E H κ² u = 0,
-with free borders. For uniform material the energy per length has the closed form (τ = 0; κ̄ of a plate that swells
-alike in all directions, D = E H³/12(1 − ν²))
+A strip that swells alike in all directions to the curvature κ̄, where it is narrow, has the energy (`forces.flattening`
+without twist)
 
-    U/w = ½ D [(κ − κ̄)² + κ̄² − 2ν (κ − κ̄) κ̄ − c² g(ψ)],    c = κ̄ − ν (κ − κ̄)
-    g = 2 (cosh ψ − cos ψ)/[ψ (sinh ψ + sin ψ)],    ψ = w (3(1 − ν²))^¼ √(|κ|/H)
+    U/(½ k₁ κ̄²) = (κ/κ̄ − 1)² + (D*₂₂/k₁) (1 − a₁ (κ/κ̄ − 1))² (1 − g(x; β)),   x = ½ w² κ √(Ẽ/D₂₂)
 
-which was checked against the section solved numerically and against elasticity in space. g → 1, a narrow strip, is the
-beam of the models here: stiffness E w H³/12, and at rest κ = κ̄. g → 0 is a plate: D w, and κ = (1 + ν) κ̄. In between
-both depend on w²κ̄/H alone. A strip that is curved at rest without swelling has U/w = ½ D (1 − ν² g) (κ − κ̄)², and so at
-rest the stiffness EI (1 − ν² g)/(1 − ν²).
+For layers with one Poisson's ratio a₁ = ν, D*₂₂/k₁ = 1/(1 − ν²), β = 0 and, of one modulus, x = w²κ/H √(3(1 − ν²)):
+that was checked against the section solved numerically and against elasticity in space. g → 1, a narrow strip, is the
+beam of the models here: stiffness k₁, and at rest κ = κ̄. g → 0 is a plate: then κ = (1 + ν) κ̄. A strip that is curved
+at rest without swelling has the stiffness k₁ + D*₂₂ a₁² (1 − g) there.
 
 A swollen strip that is wide enough has stretches of negative ∂²U/∂κ²: held straighter, it folds in one joint, as a tape
 spring does. The figures hold one width away from clamps.
@@ -19,21 +17,26 @@ spring does. The figures hold one width away from clamps.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
 Array = np.ndarray
-SMALL = 0.05
-"""ψ below which g is its series: 1 − ψ⁴/180."""
-LARGE = 30.0
-"""ψ above which g is 2/ψ to the last digit."""
+SMALL = 2.5e-3
+"""x below which g is its series: 1 − x²/180."""
+LARGE = 900.0
+"""(1 + β) x above which g is 2 √((1 + β)/x) to the last digit."""
 RATIOS = np.geomspace(0.05, 1e4, 400)
 """w²κ̄/H between which curvatures are interpolated."""
 STEP = 1e-4
 """Of ratios, for a difference."""
 CURVATURES = np.linspace(0.01, 1.6, 1600)
 """Of κ/κ̄, where tangents are looked at."""
+BROADEST = 100.0
+"""w²κ/H up to which strips are asked whether they fold or are stiffer than beams."""
+BISECTIONS = 20
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 SECTIONS = 32
 """Golden sections, which leave 1e-7 of κ̄."""
@@ -41,72 +44,101 @@ TERMS = 12
 """Of the series of φ, by powers of x²: exact to rounding up to |x| = 32."""
 
 
-def _factor(ratio: Array, poisson: float) -> Array:
-    """Return g of strips by their w²κ/H."""
-    psi = (3.0 * (1.0 - poisson**2)) ** 0.25 * np.sqrt(np.asarray(ratio, float))
-    middle = np.clip(psi, SMALL, LARGE)
-    g = 2.0 * (np.cosh(middle) - np.cos(middle)) / (middle * (np.sinh(middle) + np.sin(middle)))
-    return np.where(psi < SMALL, 1.0 - psi**4 / 180.0, np.where(psi > LARGE, 2.0 / np.maximum(psi, LARGE), g))
+@dataclass(frozen=True)
+class StripLaw:
+    """The law of a strip that is bent.
 
-
-def swollen_energy(curvature: Array, ratio: float | Array, poisson: float) -> Array:
-    """Return U/(½ w D κ̄²) of a strip that swells alike in all directions.
-
-    Parameters
+    Attributes
     ----------
-    curvature : ndarray
-        κ/κ̄, above 0.
-    ratio : float or ndarray
-        w²κ̄/H.
-    poisson : float
-        ν.
+    curl : float
+        a₁.
+    plate : float
+        D*₂₂/k₁.
+    offset : float
+        β, for a curvature towards the normal; else −β.
+    slope : float
+        x over w²κ/H.
     """
-    g = _factor(ratio * curvature, poisson)
-    change = curvature - 1.0
-    return change**2 + 1.0 - 2.0 * poisson * change - (1.0 - poisson * change) ** 2 * g
+
+    curl: float
+    plate: float
+    offset: float
+    slope: float
+
+    def _factor(self, ratio: Array) -> Array:
+        """Return g of strips by their w²κ/H."""
+        x, most = self.slope * np.asarray(ratio, float), LARGE / (1.0 + self.offset)
+        middle = np.clip(x, SMALL, most)
+        p, q = np.sqrt((1.0 + self.offset) * middle), np.sqrt((1.0 - self.offset) * middle)
+        g = 2.0 * (np.cosh(p) - np.cos(q)) / (middle * (np.sinh(p) / p + np.sin(q) / q))
+        wide = 2.0 * np.sqrt((1.0 + self.offset) / np.maximum(x, most))
+        return np.where(x < SMALL, 1.0 - x**2 / 180.0, np.where(x > most, wide, g))
+
+    def energy(self, curvature: Array, ratio: float | Array) -> Array:
+        """Return U/(½ k₁ κ̄²) at a κ/κ̄ above 0 of strips that swell alike in all directions, by their w²κ̄/H."""
+        change = curvature - 1.0
+        return change**2 + self.plate * (1.0 - self.curl * change) ** 2 * (1.0 - self._factor(ratio * curvature))
+
+    def curvature(self, ratio: Array) -> Array:
+        """Return κ/κ̄ at rest of strips that swell alike in all directions, by their w²κ̄/H."""
+        return np.interp(np.log(np.maximum(ratio, RATIOS[0])), np.log(RATIOS), _rests(self))
+
+    def curvature_across(self, ratio: Array) -> Array:
+        """Return the mean curvature across over κ̄, in the state of `curvature`: (1 − a₁ (κ/κ̄ − 1)) g."""
+        along = self.curvature(ratio)
+        return (1.0 - self.curl * (along - 1.0)) * self._factor(ratio * along)
+
+    def stiffness(self, ratio: Array) -> Array:
+        """Return the bending stiffness at rest, over k₁, of strips that are curved without swelling, by their w²κ/H."""
+        return 1.0 + self.plate * self.curl**2 * (1.0 - self._factor(ratio))
+
+    def bent_stiffness(self, ratio: Array) -> Array:
+        """Return the moment over k₁ κ of flat strips that are bent to w²κ/H: with the energy k₁ κ² s/2, in which s is
+        `stiffness`, d(r² s)/d(r²).
+        """
+        ends = np.multiply.outer([1.0 - STEP, 1.0 + STEP], ratio)
+        energy = ends**2 * self.stiffness(ends)
+        return (energy[1] - energy[0]) / (ends[1] ** 2 - ends[0] ** 2)
+
+    def folds(self, ratio: float) -> bool:
+        """Return whether a swollen strip, held straighter than it rests, has a negative tangent somewhere."""
+        return bool((np.diff(self.energy(CURVATURES, ratio), 2) < 0.0).any())
 
 
 @lru_cache(maxsize=32)
-def _rests(poisson: float) -> Array:
+def _rests(law: StripLaw) -> Array:
     """Return κ/κ̄ at rest for each of `RATIOS`."""
-    low, high = np.full(RATIOS.size, 0.5), np.full(RATIOS.size, 1.05 + max(poisson, 0.0))
+    wide = law.plate * law.curl / (1.0 + law.plate * law.curl**2)
+    low, high = np.full(RATIOS.size, 0.5), np.full(RATIOS.size, 1.05 + max(wide, 0.0))
     for _ in range(SECTIONS):  # of the least energy by golden sections
         first, second = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-        left = swollen_energy(first, RATIOS, poisson) < swollen_energy(second, RATIOS, poisson)
+        left = law.energy(first, RATIOS) < law.energy(second, RATIOS)
         low, high = np.where(left, low, first), np.where(left, second, high)
     return 0.5 * (low + high)
 
 
-def swollen_curvature(ratio: Array, poisson: float) -> Array:
-    """Return κ/κ̄ at rest of strips that swell alike in all directions, by their w²κ̄/H."""
-    return np.interp(np.log(np.maximum(ratio, RATIOS[0])), np.log(RATIOS), _rests(poisson))
-
-
-def swollen_curvature_across(ratio: Array, poisson: float) -> Array:
-    """Return the mean curvature across over κ̄, in the state of `swollen_curvature`: (1 − ν (κ/κ̄ − 1)) g."""
-    along = swollen_curvature(ratio, poisson)
-    return (1.0 - poisson * (along - 1.0)) * _factor(ratio * along, poisson)
-
-
-def curved_stiffness(ratio: Array, poisson: float) -> Array:
-    """Return the bending stiffness at rest, over EI, of strips that are curved without swelling, by their w²κ/H."""
-    return (1.0 - poisson**2 * _factor(ratio, poisson)) / (1.0 - poisson**2)
-
-
-def bent_stiffness(ratio: Array, poisson: float) -> Array:
-    """Return the moment over EI κ of flat strips that are bent to w²κ/H: with the energy EI κ² g/2, in which g is
-    `curved_stiffness`, d(r² g)/d(r²).
+@lru_cache(maxsize=32)
+def folding_ratio(law: StripLaw) -> float:
+    """Return w²κ̄/H from which on strips that swell alike in all directions have negative tangents; infinite if none
+    has.
     """
-    ends = np.multiply.outer([1.0 - STEP, 1.0 + STEP], ratio)
-    energy = ends**2 * curved_stiffness(ends, poisson)
-    return (energy[1] - energy[0]) / (ends[1] ** 2 - ends[0] ** 2)
+    return _least_ratio(law.folds)
 
 
-@lru_cache(maxsize=256)
-def folds(ratio: float, poisson: float) -> bool:
-    """Return whether a swollen strip, held straighter than it rests, has a negative tangent somewhere."""
-    energy = swollen_energy(CURVATURES, ratio, poisson)
-    return bool((np.diff(energy, 2) < 0.0).any())
+@lru_cache(maxsize=32)
+def stiff_ratio(law: StripLaw, part: float) -> float:
+    """Return w²κ/H from which on a strip that loads bend is stiffer than a beam by a part; infinite if none is."""
+    return _least_ratio(lambda ratio: float(law.bent_stiffness(ratio)) > 1.0 + part)
+
+
+def _least_ratio(is_beyond: Callable[[float], bool]) -> float:
+    low, high = 0.0, BROADEST
+    if not is_beyond(high):
+        return math.inf
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if is_beyond(middle) else (middle, high)
+    return high
 
 
 def flattening_series(offset: Array) -> Array:

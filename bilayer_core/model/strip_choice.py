@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
 from bilayer_core.model.edge_figures import EdgeFigures, edge_figures
 from bilayer_core.model.findings import Figure
 from bilayer_core.model.plate_section import PlateSection, is_plate, plate_section
-from bilayer_core.model.plate_strip import (
-    bent_stiffness,
-    curved_stiffness,
-    folds,
-    swollen_curvature,
-    swollen_curvature_across,
-)
+from bilayer_core.model.plate_strip import StripLaw, folding_ratio
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.diffusion_modes import strain_at
 from bilayer_core.scene.profile import Profile
@@ -29,9 +22,7 @@ PLATE = 0.05
 """Likewise above which a beam is told to be wrong."""
 THIN = 2.0
 """Width over thickness from which on layers of unlike Poisson's ratios hold each other across, as plates do."""
-BROADEST = 100.0
-"""w²κ/H up to which strips are asked whether they fold."""
-BISECTIONS = 20
+PLATES = "of fibres or of unlike poisson_ratio"
 HELD = 0.2
 """Part of a strip within one width from its clamps that counts."""
 
@@ -54,11 +45,31 @@ class Departure:
     curved: float
 
 
+def law_of(scene: SceneConfig, rod: Rod) -> StripLaw:
+    """Return the law of a strip with the section of a rod, bent to the side to which it swells."""
+    plate = plate_section(scene, rod)
+    return plate.bent(_swells_to(scene, rod, plate)[0] >= 0.0)
+
+
+def _swells_to(scene: SceneConfig, rod: Rod, plate: PlateSection) -> tuple[float, float, float]:
+    """Return the curvature and twist to which layers bring a narrow strip, all of which swell, and the largest
+    curvature across to which some do [1/m].
+    """
+    found = np.zeros(3)
+    for slot, layer in enumerate(rod.layers):
+        natural = plate.natural(slot)
+        for law in layer.eigenstrain:
+            channel = scene.stimuli[law.stimulus]
+            strain = max(strain_at(rod, layer, law, np.array([channel.minimum, channel.maximum])), key=abs)
+            found += strain * natural.along, strain * natural.twist, abs(strain * natural.across)
+    return tuple(found.tolist())
+
+
 def departure(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Departure:
     """Return by how much a strip with the figures of a rod differs from a beam; nothing is said of one with fibres."""
     if any(layer.fibres for layer in rod.layers):
         return Departure(0.0, 0.0, 0.0, 0.0)
-    curvature, poisson = at_edges.curvature(), at_edges.poisson_ratio
+    curvature, law = at_edges.curvature(), law_of(scene, rod)
     ratio = at_edges.width**2 * curvature / at_edges.thickness
     swells = at_edges.free_curvature() > 0.5 * curvature
     if all(layer.swelling == "along" for layer in rod.layers if layer.eigenstrain):
@@ -67,11 +78,12 @@ def departure(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Departure:
     if is_plate(scene, rod) and (at_edges.width > THIN * at_edges.thickness).any():
         _, stiffer, _, curl = plate_section(scene, rod).growth
     if swells.any():
-        changes = curl * swollen_curvature(ratio[swells], poisson) - 1.0
+        ratios = curl * ratio[swells]
+        changes = curl * law.curvature(ratios) - 1.0
         worst = int(np.abs(changes).argmax())
-        change, swollen = float(changes[worst]), float(ratio[swells][worst])
+        change, swollen = float(changes[worst]), float(ratios[worst])
     curved = float(ratio[~swells].max(initial=0.0))
-    of_stiffness = stiffer * float(curved_stiffness(curved, poisson)) - 1.0 if curved else 0.0
+    of_stiffness = stiffer * float(law.stiffness(curved)) - 1.0 if curved else 0.0
     return Departure(change, swollen, of_stiffness, curved)
 
 
@@ -86,15 +98,17 @@ def refusal(scene: SceneConfig, rod: Rod) -> str:
             return f"needs layers of one width, that of the rod, and {layer.name} has a `width`"
         if layer.stiffness_change is not None:
             return f"needs layers whose moduli stay, and {layer.name} has a `stiffness_change`"
-        if layer.interval is not None:
-            return f"needs layers that cover all of it, and {layer.name} has an `interval`"
         if layer.natural_twist != 0.0:
             return f"takes its twist from its path, and {layer.name} has a `natural_twist`"
-        if layer.natural_curvature is not None and is_plate(scene, rod):
-            return f"of fibres or of unlike poisson_ratio takes no `natural_curvature`, and {layer.name} has one"
+        if not is_plate(scene, rod):
+            continue
+        if layer.natural_curvature is not None:
+            return f"{PLATES} takes no `natural_curvature`, and {layer.name} has one"
+        if layer.interval is not None:
+            return f"{PLATES} needs layers that cover all of it, and {layer.name} has an `interval`"
         for key in ("thickness", "stiffness"):
             if isinstance(getattr(layer, key), Profile):
-                return f"needs one {key} all along it, and that of {layer.name} is a profile"
+                return f"{PLATES} needs one {key} all along it, and that of {layer.name} is a profile"
     return ""
 
 
@@ -117,30 +131,6 @@ def section_of(scene: SceneConfig, rod: Rod, model: str = "laminate") -> str:
 def plate_of(scene: SceneConfig, rod: Rod) -> PlateSection | None:
     """Return the section of a rod of the laminate if it is that of a laminated plate."""
     return plate_section(scene, rod) if is_plate(scene, rod) and section_of(scene, rod) == "strip" else None
-
-
-@lru_cache(maxsize=32)
-def folding_ratio(poisson: float) -> float:
-    """Return w²κ̄/H from which on strips that swell alike in all directions have negative tangents; infinite if none
-    has.
-    """
-    return _least_ratio(lambda ratio: folds(ratio, poisson))
-
-
-@lru_cache(maxsize=32)
-def stiff_ratio(poisson: float) -> float:
-    """Return w²κ/H from which on a plate that loads bend is stiffer than a beam by `PLATE`; infinite if none is."""
-    return _least_ratio(lambda ratio: float(bent_stiffness(ratio, poisson)) > 1.0 + PLATE)
-
-
-def _least_ratio(is_beyond: Callable[[float], bool]) -> float:
-    low, high = 0.0, BROADEST
-    if not is_beyond(high):
-        return np.inf
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if is_beyond(middle) else (middle, high)
-    return high
 
 
 def plates(scene: SceneConfig, model: str) -> Iterator[Figure]:
@@ -189,11 +179,10 @@ def plate_figures(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures, model: st
         yield from _of_fibres(where, scene, rod, at_edges, plate)
     if not strip:
         return
-    limit = folding_ratio(at_edges.poisson_ratio)
     if found.swollen > 0.0:
-        yield _of_folds(where, at_edges, found.swollen, limit)
+        yield _of_folds(where, at_edges, found.swollen, folding_ratio(law_of(scene, rod)))
     if scene.contact is not None:
-        yield from _of_height(where, at_edges, found.swollen, limit, scene.contact.barrier_distance)
+        yield from _of_height(where, scene, rod, at_edges, found.swollen)
     held = sum(bool(end) for end in (rod.clamp_start, rod.clamp_end)) * float(at_edges.width.max()) / rod.path.length
     if held > HELD:
         yield Figure(
@@ -210,13 +199,7 @@ def _of_fibres(
     where: str, scene: SceneConfig, rod: Rod, at_edges: EdgeFigures, plate: PlateSection
 ) -> Iterator[Figure]:
     """Yield to what layers with fibres bend and twist a narrow strip, and what part of its stiffness is left out."""
-    bend = twist = 0.0
-    for slot, layer in enumerate(rod.layers):
-        natural = plate.natural(slot)
-        for law in layer.eigenstrain:
-            channel = scene.stimuli[law.stimulus]
-            strain = max(strain_at(rod, layer, law, np.array([channel.minimum, channel.maximum])), key=abs)
-            bend, twist = bend + strain * natural.along, twist + strain * natural.twist
+    bend, twist, _ = _swells_to(scene, rod, plate)
     held = rod.clamp_start and rod.clamp_end
     size = bend**2 + twist**2
     if size > 0.0:
@@ -247,18 +230,22 @@ def _of_folds(where: str, at_edges: EdgeFigures, ratio: float, limit: float) -> 
         f"{ratio:.3g}",
         f"at most {limit:.3g}{strain if ratio > limit else ''}",
         ratio / limit,
-        "beyond, held straighter it may fold in one place, as a tape spring does, and the mesh says where"
+        "beyond, held straighter it may fold in one place, as a tape spring does, where a run stops"
         if ratio > limit
         else "",
     )
 
 
-def _of_height(where: str, at_edges: EdgeFigures, ratio: float, limit: float, distance: float) -> Iterator[Figure]:
+def _of_height(where: str, scene: SceneConfig, rod: Rod, at_edges: EdgeFigures, ratio: float) -> Iterator[Figure]:
     """Yield the height of a section, κ_y w²/8, of that in which κ̄y is largest."""
-    free = float((at_edges.free_curvature(across=True) * at_edges.width**2).max()) / 8.0
-    if 0.0 < ratio <= limit:  # beyond it may roll up across, where κ̄y is all there is
+    law, distance = law_of(scene, rod), scene.contact.barrier_distance
+    curvature = at_edges.free_curvature(across=True)
+    if is_plate(scene, rod):
+        curvature[:] = _swells_to(scene, rod, plate_section(scene, rod))[2]
+    free = float((curvature * at_edges.width**2).max()) / 8.0
+    if 0.0 < ratio <= folding_ratio(law):  # beyond it may roll up across, where κ̄y is all there is
         ratios = np.linspace(0.0, ratio, 101)[1:]
-        free *= float((swollen_curvature_across(ratios, at_edges.poisson_ratio) * ratios).max()) / ratio
+        free *= float((law.curvature_across(ratios) * ratios).max()) / ratio
     if free > 0.0:
         yield Figure(
             where,

@@ -190,7 +190,8 @@ SAMPLES = 257
 
 
 def _least_strain(scene: SceneConfig, rod: Rod, layer: Layer, laws: list[Eigenstrain]) -> float:
-    """Return the least sum of the eigenstrains of some laws of a layer that the ranges of their channels allow.
+    """Return the least sum of the eigenstrains of some laws of a layer that the ranges of their channels allow, along
+    or across its fibres.
 
     Laws of one channel with the same lags have reached the same stimulus at any time. Others may be anywhere in their
     ranges independently, as lags never leave the range of what they follow.
@@ -198,12 +199,12 @@ def _least_strain(scene: SceneConfig, rod: Rod, layer: Layer, laws: list[Eigenst
     together: dict[tuple, list[Eigenstrain]] = {}
     for law in laws:
         together.setdefault((law.stimulus, law.lags), []).append(law)
-    total = 0.0
+    total = np.zeros(len(layer.multiples))
     for (name, _), group in together.items():
         channel = scene.stimuli[name]
         values = np.linspace(channel.minimum, channel.maximum, SAMPLES)
-        total += float(sum(strain_at(rod, layer, law, values) for law in group).min())
-    return total
+        total += np.outer(layer.multiples, sum(strain_at(rod, layer, law, values) for law in group)).min(axis=1)
+    return float(total.min())
 
 
 def _clamps(scene: SceneConfig) -> Iterator[Fault]:

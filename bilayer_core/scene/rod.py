@@ -122,6 +122,11 @@ class Layer(Part):
         return self.model_copy(update={"eigenstrain": laws, "stiffness_change": change})
 
     @property
+    def multiples(self) -> tuple[float, ...]:
+        """Multiples of its eigenstrain along and across its fibres, or in all directions."""
+        return (1.0,) if self.fibres is None else (self.fibres.along.swelling, self.fibres.across.swelling)
+
+    @property
     def laws(self) -> dict[Location, Following]:
         """All that follows a stimulus, by its place in the layer."""
         laws: dict[Location, Following] = {("eigenstrain", k): law for k, law in enumerate(self.eigenstrain)}

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bilayer_core.forces.flattening import write_flatness
+from bilayer_core.forces.flattening import write_sections
 from bilayer_core.model.state import State, sealed
 from bilayer_core.observed.frame import Frame
 from bilayer_core.simulation.observation import energies, positions_with_points, velocities_with_points
@@ -25,7 +25,7 @@ class Capture:
         self.model, self.owners = stepper.model, stepper.contact_owners
         self.seen, self.touching = stepper.observe(state)
         if self.model.flattening.exists:
-            _ = write_flatness.address  # loaded by the thread of the steps, whoever asks for sections
+            _ = write_sections.address  # loaded by the thread of the steps, whoever asks for sections
         self.values, self.places = state.values.copy(), state.places
         self.values.flags.writeable = False  # parts of it are handed out as they are
         self.state = Parts(self.values, self.places)

@@ -32,7 +32,7 @@ from bilayer_core.model.records.status import CROSSED, MAX_ITERATIONS
 from bilayer_core.model.state import NOT_KNOWN, State, reached_at_rest
 from bilayer_core.simulation.crossing_remedy import crossing
 from bilayer_core.simulation.stepper import Stepper
-from bilayer_core.simulation.strip_sections import disturb, shapes
+from bilayer_core.simulation.strip_sections import FOLDS, disturb, shapes
 
 FIRST, GROWTH, SHRINKAGE, SHORTEST = 1e-2, 10.0, 0.25, 1e-7
 """Length h of the first round [s], its factors after success and failure, and the length at which to give up [s]."""
@@ -284,8 +284,7 @@ class _Search:
         strips = shapes(self.stepper.model, self.state)
         for name in (name for name, shape in strips.items() if shape == "folded"):
             raise self._failure(
-                f"rods.{name} folds: its parts are in two shapes of rest, and where these meet depends on the mesh; "
-                "raise its stimulus in steps, with statics after each",
+                f"rods.{name} {FOLDS}; raise its stimulus in steps, with statics after each",
                 0.0,
             )
         self.stepper.restart(self.state)

@@ -24,9 +24,13 @@ from bilayer_core.simulation.plane_watch import PlaneWatch
 from bilayer_core.simulation.run_result import RunResult, Termination
 from bilayer_core.simulation.statistics import RunStatistics, center_of_mass
 from bilayer_core.simulation.stepper import Stepper, StepReport
+from bilayer_core.simulation.strip_sections import FOLDS, folds
 
 STEPS_AT_ONCE = 64
 """That the engine makes before anyone is asked whether to go on."""
+STEPS_TO_LOOK = 128
+"""Between two looks at strips, each of which costs one or two steps."""
+NO_FOLD = "a slower stimulus, less of it, or a strip that is less wide does not fold; `section: beam` never does"
 
 
 @dataclass(frozen=True)
@@ -124,6 +128,7 @@ class RunLoop:
         self._stepper.engine.start_over(height)
         self.termination = Termination.COMPLETED.value
         self.cpu_time = self.wall_time = 0.0
+        self._since_look = 0
         if self._plane_watch is not None:
             self._plane_watch.restart(self._time)
 
@@ -189,6 +194,7 @@ class RunLoop:
                 raise
             self.statistics.update(found, int(state.step[0] - before), self._stepper)
         self._look_out(found.done)
+        self._look_at_strips(found.done)
         for attached in self.attached:
             attached.observe_due()
         return found
@@ -199,6 +205,21 @@ class RunLoop:
             return
         with self.timed():
             self._plane_watch.look(self._state, self._stepper.surroundings.load_factor(self._state))
+
+    def _look_at_strips(self, steps: int, last: bool = False) -> None:
+        """Look for strips that have folded, after so many more steps."""
+        self._since_look += steps
+        if not last and self._since_look < STEPS_TO_LOOK:
+            return
+        self._since_look = 0
+        with self.timed():
+            found = folds(self._stepper.model, self._state)
+        for name, shape in found.items():
+            if shape == "creased":
+                self.statistics.creased.setdefault(name, self._time)
+            if shape == "folded":
+                self.termination = Termination.FAILED.value
+                raise SimulationError(f"rods.{name} {FOLDS}; {NO_FOLD}", self._time)
 
     def run(
         self,
@@ -226,6 +247,7 @@ class RunLoop:
             termination = self._advance(end, last, schedule, inputs, callbacks)
             if termination is Termination.COMPLETED:
                 self._look_out(0, last=True)
+                self._look_at_strips(0, last=True)
             for attached in self.attached:
                 attached.observe_last()
         except BaseException as failure:

@@ -45,7 +45,7 @@ class RunStatistics:
     curvature by loads over what a beam as wide may have, and its joint (`model.bent_plates`); `body_tops` is the
     greatest height of each body. These and `max_curvature` count the state at the start too. `numerical_before` is the
     numerical energy of the state where the run began, `put_in` and `taken_out` are sums of what each step was supplied
-    and lost [J].
+    and lost [J]. `creased` says since when strips were creased (`simulation.strip_sections`).
     """
 
     steps: int = 0
@@ -75,6 +75,7 @@ class RunStatistics:
     numerical_before: float = 0.0
     body_tops: dict[str, float] = field(default_factory=dict)
     bodies: dict[str, BodyContact] = field(default_factory=dict)
+    creased: dict[str, float] = field(default_factory=dict)
 
     @property
     def beyond_limits(self) -> tuple[str, ...]:

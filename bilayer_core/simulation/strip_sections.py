@@ -6,19 +6,18 @@ over its width,
     κ_y Δl = κ̄y Δl − a₁ (κ₁ − κ̄₁) − 2 a₃ (ψ − ψ̄) − N Λ κ₁ φ
 
 from the curvature of a free plate, where a strip is narrow, to ψ²/κ₁ where it is wide. A swollen strip that is wide
-enough has two shapes at rest, curled along or rolled up across. Where both are in one strip, it has folded: how far
-the one reaches depends on the mesh, since the law of a joint knows nothing of the joints beside it.
+enough has two shapes at rest, curled along or rolled up across. Where both are in one strip, it has folded: the mesh
+says where they meet, since the law of a joint knows nothing of the joints beside it. So does twist that loads force on
+a ribbon where it is hardly bent: the ribbon creases. In both, what two neighbouring joints bear is the same, and the
+tangent between their strains is negative somewhere.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
-from bilayer_core.forces.flattening import Flatness, write_flatness
+from bilayer_core.forces.flattening import Sections, write_sections
 from bilayer_core.model.model import Model
-from bilayer_core.model.plate_strip import folds
 from bilayer_core.model.state import State
 from bilayer_core.model.strand_arrays import StrandArrays
 from bilayer_core.scene.transduction import free_strain
@@ -29,18 +28,51 @@ DISTURBANCE = 1e-3
 are rolled up across, may be unstable against twist alone, and nothing else leads away from them."""
 ACROSS = 2.0
 """Curvature across over that along from which a section counts as rolled up across."""
-JUMP = 0.5
-"""Step of the curvature from a joint to the next, over the natural curvature and twist, from which on a strip that
-fibres twist has folded: one of its two shapes at rest is on either side."""
+JUMP = 0.2
+"""Step of curvature and twist from a joint to the next, over the largest natural ones of the strip, or else over its
+largest, that may be a jump."""
+FOLDS = "folds: its parts are in two shapes of rest, and where these meet depends on the mesh"
+BETWEEN = np.linspace(0.0, 1.0, 17)
+"""Where the law is looked at between the strains of two joints."""
 
 
-def _natural(model: Model, state: State) -> tuple[Array, Array, Array]:
-    """Return κ̄₁, ψ̄ and κ̄y Δl of strip joints, shape (n_strip_joint,)."""
-    drives, strips, rest = model.drives, model.flattening, model.drives.joint_rest.copy()
+def _rest(model: Model, state: State) -> Array:
+    """Return `Stage.rest_joint` of a state."""
+    drives, rest = model.drives, model.drives.joint_rest.copy()
     strain = free_strain(state.transduction, drives.law_gain, drives.law_reference, drives.law_saturation)
     driven = drives.driven_joint, drives.driven_joint_column
     np.add.at(rest, driven, drives.driven_joint_weight * strain[drives.driven_joint_law])
+    return rest
+
+
+def _natural(model: Model, rest: Array) -> tuple[Array, Array, Array]:
+    """Return κ̄₁, ψ̄ and κ̄y Δl of strip joints, shape (n_strip_joint,)."""
+    strips = model.flattening
     return rest[strips.joint, 0], rest[strips.joint, 2], rest[strips.first :][: len(strips.joint), 0]
+
+
+def _law(model: Model, rest: Array, kappa: Array, psi: Array) -> Sections:
+    """Return the law of strip joints at strains κ₁ and ψ."""
+    of = Sections(rest=rest, kappa=kappa, psi=psi, pull=np.zeros(len(kappa)), tangent=np.zeros((len(kappa), 3)))
+    write_sections(model.flattening, of)
+    return of
+
+
+def _inside(model: Model) -> Array:
+    """Return which strip joints are between two edges of a rod, not beside a clamp."""
+    rods, joint = model.rods, model.flattening.joint
+    return (rods.joint_a[joint] < rods.edge_count) & (rods.joint_b[joint] < rods.edge_count)
+
+
+def _strains(model: Model, state: State) -> tuple[Array, Array]:
+    """Return κ₁ and ψ of strip joints; κ₁ of those beside a clamp is nothing."""
+    rods, joint, inside = model.rods, model.flattening.joint, _inside(model)
+    first, second = np.where(inside, rods.joint_a[joint], 0), np.where(inside, rods.joint_b[joint], 0)
+    vector = state.position[rods.edge_node + 1] - state.position[rods.edge_node]
+    tangent = vector / np.linalg.norm(vector, axis=1, keepdims=True)
+    a, b = tangent[first], tangent[second]
+    bend = np.einsum("ki,ki->k", b, state.director1[first]) - np.einsum("ki,ki->k", a, state.director1[second])
+    return bend / (1.0 + np.einsum("ki,ki->k", a, b)), state.twist[joint]
 
 
 def curvatures(model: Model, state: State) -> tuple[Array, Array]:
@@ -48,20 +80,10 @@ def curvatures(model: Model, state: State) -> tuple[Array, Array]:
 
     Those beside a clamp have the values of the next joint.
     """
-    rods, strips = model.rods, model.flattening
-    first, second = rods.joint_a[strips.joint], rods.joint_b[strips.joint]
-    inside = (first < rods.edge_count) & (second < rods.edge_count)
-    first, second = np.where(inside, first, 0), np.where(inside, second, 0)
-    vector = state.position[rods.edge_node + 1] - state.position[rods.edge_node]
-    tangent = vector / np.linalg.norm(vector, axis=1, keepdims=True)
-    a, b = tangent[first], tangent[second]
-    bend = np.einsum("ki,ki->k", b, state.director1[first]) - np.einsum("ki,ki->k", a, state.director1[second])
-    kappa, psi = bend / (1.0 + np.einsum("ki,ki->k", a, b)), state.twist[strips.joint]
-    along, twist, across = _natural(model, state)
+    strips, inside, (kappa, psi), rest = model.flattening, _inside(model), _strains(model, state), _rest(model, state)
+    along, twist, across = _natural(model, rest)
     free = across - strips.curl * (kappa - along) - strips.skew * (psi - twist)
-    flattened, phi = kappa * free - psi**2 + strips.start, Flatness(x=strips.scale * kappa, value=np.zeros(len(kappa)))
-    write_flatness(strips, phi)
-    curved = free - flattened * strips.scale * phi.x * phi.value
+    curved = free - _law(model, rest, kappa, psi).pull * strips.scale**2 / strips.stiffness
     length = model.voronoi_length[strips.joint]
     place = np.arange(len(kappa))
     nearest = np.abs(place[:, None] - place[inside]).argmin(axis=1) if inside.any() else place
@@ -94,7 +116,7 @@ def _joints_of(model: Model, strand: StrandArrays) -> Array:
 
 def disturb(model: Model, state: State) -> None:
     """Turn the edges of strips that curl across about their tangents, most between the ends, by `DISTURBANCE`."""
-    natural = _natural(model, state)[2] if model.flattening.exists else np.zeros(0)
+    natural = _natural(model, _rest(model, state))[2] if model.flattening.exists else np.zeros(0)
     for strand in model.strands:
         if not natural.any() or not natural[_joints_of(model, strand)].any():
             continue
@@ -107,43 +129,59 @@ def disturb(model: Model, state: State) -> None:
         state.director1[edges] = np.cos(angle) * director + np.sin(angle) * np.cross(tangent, director)
 
 
-def shapes(model: Model, state: State) -> dict[str, str]:
-    """Return the shape of each strip that curls across: `curled along`, `rolled across` or `folded`; of one that fibres
-    twist, which may have any shape between these, only that it is folded.
-    """
+def folds(model: Model, state: State) -> dict[str, str]:
+    """Return `folded` for each strip whose curvature jumps, or `creased` if loads alone bend and twist it."""
     found: dict[str, str] = {}
     if not model.flattening.exists:
         return found
-    bend, across = curvatures(model, state)
-    along, across = np.abs(bend), np.abs(across)
-    strips, (free, twist, natural) = model.flattening, _natural(model, state)
-    natural, twisted = np.abs(natural), twist**2 != strips.start
-    size = np.hypot(free, twist) / model.voronoi_length[strips.joint]
-    ratio = strips.scale / np.sqrt(3.0 * (1.0 - strips.curl**2)) * natural  # w²κ̄y/H
+    rest, strains, inside = _rest(model, state), _strains(model, state), _inside(model)
+    _, twist, across = natural = _natural(model, rest)
+    active = (across != 0.0) | (twist**2 != model.flattening.start)
     for strand in model.strands:
         own = _joints_of(model, strand)
-        if len(own) and twisted[own].any():
-            if (np.abs(np.diff(bend[own])) > JUMP * size[own[1:]]).any():
-                found[strand.rod] = "folded"
-            continue
-        if not len(own) or not natural[own].any():
-            continue
-        rolled = across[own] > ACROSS * along[own]
-        worst = own[ratio[own].argmax()]
-        if rolled.all():
-            found[strand.rod] = "rolled across"
-        elif rolled.any() and folds(float(ratio[worst]), float(strips.curl[worst])):
-            found[strand.rod] = "folded"
-        else:
-            found[strand.rod] = "curled along"
+        if _jumps(model, rest, natural, strains, own[inside[own]]):
+            found[strand.rod] = "folded" if active[own].any() else "creased"
     return found
 
 
-def folded(model: Model, state: State) -> Iterator[str]:
-    """Yield a warning for each strip that has folded."""
-    for name, shape in shapes(model, state).items():
-        if shape == "folded":
-            yield (
-                f"rods.{name} has folded: its parts are in two shapes of rest, and where these meet depends on the "
-                "mesh; a slower stimulus, or a strip that is less wide, does not fold"
-            )
+def shapes(model: Model, state: State) -> dict[str, str]:
+    """Return the shape of each strip that curls across, `curled along` or `rolled across`, and of those in `folds`. One
+    that fibres twist may have any other shape.
+    """
+    found = folds(model, state)
+    if not model.flattening.exists:
+        return found
+    _, twist, natural = _natural(model, _rest(model, state))
+    along, across = map(np.abs, curvatures(model, state))
+    for strand in model.strands:
+        own = _joints_of(model, strand)
+        if natural[own].any() and not (twist**2 != model.flattening.start)[own].any():
+            shape = "rolled across" if (across > ACROSS * along)[own].all() else "curled along"
+            found.setdefault(strand.rod, shape)
+    return found
+
+
+def _jumps(
+    model: Model, rest: Array, natural: tuple[Array, Array, Array], strains: tuple[Array, Array], own: Array
+) -> bool:
+    """Return whether curvature or twist jump from one to the next of these joints, which come in order: by so much,
+    under like stimuli, and over strains at which the law has a negative tangent. No smooth state has that on any mesh.
+    """
+    joint = model.flattening.joint[own]
+    length = model.voronoi_length[joint][:, None]
+    strain = np.stack([of[own] for of in strains], axis=1) / length
+    free = np.stack([of[own] for of in natural], axis=1) / length
+    sizes = (np.hypot(*of.T[:2]).max(initial=0.0) for of in (free, strain))
+    step, size = np.diff(strain, axis=0), next((size for size in sizes if size > 0.0), 0.0)
+    alike = np.abs(np.diff(free, axis=0)).max(axis=1, initial=0.0) <= JUMP * size
+    far = np.flatnonzero((np.hypot(*step.T) > JUMP * size) & alike)
+    stiffness, (bend, twist) = model.rods.joint_stiffness[joint[far]], (step[far] * length[far]).T
+    for part in BETWEEN if len(far) else ():
+        kappa, psi = (of.copy() for of in strains)
+        kappa[own[far]] += part * bend
+        psi[own[far]] += part * twist
+        k11, k13, k33 = _law(model, rest, kappa, psi).tangent[own[far]].T
+        tangent = (stiffness[:, 0] + k11) * bend**2 + 2.0 * k13 * bend * twist + (stiffness[:, 2] + k33) * twist**2
+        if (tangent < 0.0).any():
+            return True
+    return False

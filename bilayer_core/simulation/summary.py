@@ -19,7 +19,6 @@ from bilayer_core.observed.system import versions
 from bilayer_core.simulation.plane_watch import PlaneWatch
 from bilayer_core.simulation.run_result import Termination
 from bilayer_core.simulation.statistics import RunStatistics
-from bilayer_core.simulation.strip_sections import folded
 from bilayer_core.simulation.views.body import BodyView
 from bilayer_core.simulation.views.joint import JointView
 
@@ -114,11 +113,19 @@ def summarise(simulator: Any) -> dict:
             *_warnings(statistics, numerical, through, simulator.plane_watch),
             *([bent_plate(model, plan.model, *statistics.bent_plate)] if statistics.bent_plate[0] > 1.0 else []),
             *_of_contact(model, statistics.unresolved, largest),
-            *folded(model, simulator._state),
+            *_of_creases(simulator),
         ],
         "unseen": list(unseen_vibrations(simulator.scene)) if statistics.max_contact_force > 0.0 else [],
         "versions": versions(),
     }
+
+
+def _of_creases(simulator: Any) -> Iterator[str]:
+    for name, time in simulator.statistics.creased.items():
+        yield (
+            f"rods.{name} is creased from t = {time:.3g} s on: where loads twist it and hardly bend it, its curvature "
+            "jumps from a joint to the next, at a place that depends on the mesh; compare several meshes"
+        )
 
 
 def numerical_energy(simulator: Any) -> tuple[float, float]:

@@ -17,7 +17,8 @@ from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_core.log.run.memory import MemoryRecorder
 from bilayer_core.model.build_model import build_model
 from bilayer_core.model.plate_strip import flattening_series
-from bilayer_core.simulation.strip_sections import folded
+from bilayer_core.simulation.strip_sections import shapes
+from bilayer_core.verification.validate.closed_forms import PlateStrip
 from bilayer_core.view.colouring import choose_colouring
 
 TABLE = {
@@ -260,22 +261,71 @@ def test_a_strip_that_folds_at_rest_is_refused_since_the_mesh_would_say_where():
         swollen(100.0, 0.5, dimension=2, values=(0.1, 0.2, 0.3))
 
 
-def test_a_run_warns_of_a_strip_of_which_a_part_curls_along_and_a_part_across():
-    curvature = 36.0 * THICKNESS / WIDTH**2
-    law = {"stimulus": "heat", "gain": curvature * THICKNESS / 1.5}
+def free_strip(ratio, stations, swelling=(0.0, 1.0)):
+    """A simulator of a strip clamped at its start that swells in two seconds, on a part of it."""
+    law = {"stimulus": "heat", "gain": ratio * (THICKNESS / WIDTH) ** 2 / 1.5}
+    if swelling != (0.0, 1.0):
+        law["interval"] = [0.2 * end for end in swelling]
     half = {"thickness": 0.5 * THICKNESS}
     layers = [layer("bottom", eigenstrain=law, **half), layer("top", **half)]
-    heat = {"heat": {"schedule": {"type": "hold", "value": 1}}}
-    strip = rod(layers, length=0.2, stations=21, width=WIDTH) | {"section": "strip"}
-    simulator = Simulator(load_scene(scene([strip], stimuli=heat)), model="laminate")
-    assert list(folded(simulator.model, simulator._state)) == []  # flat: all of it rolls up across
-    angle = np.repeat([0.0, 1.3 * curvature * 0.01], 10) * np.arange(20)
+    strip = rod(layers, length=0.2, stations=stations, width=WIDTH, clamp_start="wall") | {"section": "strip"}
+    ramp = {"type": "ramp", "start": 0.0, "end": 2.0, "from": 0.0, "to": 1.0}
+    content = scene(
+        [strip],
+        {"tolerance": 1e-3, "dimension": 2},
+        bodies=[fixed()],
+        materials={"gel": {**GEL, "poisson_ratio": 0.5, "retardation_time": 0.05}},
+        stimuli={"heat": {"schedule": ramp}},
+        duration=4.0,
+    )
+    return Simulator(load_scene(content), model="laminate")
+
+
+@pytest.mark.parametrize("stations", [21, 41, 81])
+def test_a_run_stops_when_a_strip_folds_since_the_mesh_would_say_where(stations):
+    simulator = free_strip(36.0, stations)
+    with pytest.raises(SimulationError, match=r"rods\.rod folds: .* a slower stimulus, less of it"):
+        simulator.run()
+    assert simulator.time < 4.0 and simulator.termination == "failed"
+
+
+def test_strips_that_swell_less_than_they_may_or_only_in_part_do_not_fold():
+    for strip in (free_strip(8.0, 41), free_strip(8.0, 41, (0.0, 0.52))):
+        strip.run()
+        assert shapes(strip.model, strip._state) == {"rod": "curled along"}
+
+
+def test_a_strip_of_which_a_part_curls_along_and_a_part_across_has_folded():
+    simulator = free_strip(36.0, 21)
+    simulator.set_stimulus("heat", 1.0)
+    state, curvature = simulator._state, 36.0 * THICKNESS / WIDTH**2
+    assert simulator.solve_static().strips == {"rod": "rolled across"}
+    angle = 1.3 * curvature * 0.01 * np.maximum(np.arange(20) - 9, 0)
     turned = np.stack([np.cos(angle), 0.0 * angle, np.sin(angle)], axis=1)
-    simulator._state.position[1:] = simulator._state.position[0] + np.cumsum(0.01 * turned, axis=0)
-    simulator._state.director1[:] = turned[:, [2, 1, 0]] * [-1.0, 0.0, 1.0]
-    (warning,) = folded(simulator.model, simulator._state)
-    assert "rods.rod has folded" in warning
-    assert warning in simulator.summary()["warnings"]
+    state.position[1:] = state.position[0] + np.cumsum(0.01 * turned, axis=0)
+    state.director1[:] = turned[:, [2, 1, 0]] * [-1.0, 0.0, 1.0]
+    assert shapes(simulator.model, state) == {"rod": "folded"}
+
+
+@pytest.mark.parametrize("stations", [33, 65])
+@pytest.mark.parametrize(("width", "shape"), [(0.1 / 12, {}), (0.1 / 4, {"rod": "creased"})])
+def test_a_wide_ribbon_sheared_sideways_creases_and_its_run_warns(stations, width, shape):
+    ways = [[0.0, 0.0, 0.0], [-0.025, 0.0, 0.0], [-0.025, 0.045, 0.0]]
+    motion = {"type": "prescribed", "times": [0.0, 1.0, 2.0], "displacements": ways}
+    imperfection = {"shape": "bow", "size": 1e-4}
+    ends = {"clamp_start": "wall", "clamp_end": "moved", "imperfection": imperfection}
+    content = scene(
+        [rod([layer()], 0.1, stations, width=width, section="strip", **ends)],
+        {"tolerance": 1e-3, "dimension": 3},
+        bodies=[fixed(), {"name": "moved", "position": [0.1, 0.0, 0.0], "motion": motion}],
+        materials={"gel": {**GEL, "poisson_ratio": 0.5, "retardation_time": 1e-2}},
+        duration=2.0,
+    )
+    simulator = Simulator(load_scene(content), model="laminate")
+    simulator.run()
+    assert shapes(simulator.model, simulator._state) == shape
+    told = [warning for warning in simulator.summary()["warnings"] if "rods.rod is creased from t = 1." in warning]
+    assert len(told) == len(shape)
 
 
 @pytest.mark.parametrize(("swelling", "wanted"), [("along", 1.0), ("across", 0.0)])
@@ -305,6 +355,89 @@ def test_the_work_of_a_stimulus_on_a_strip_is_what_it_gains(swelling, dimension)
     simulator.set_stimulus("humidity", 0.2)  # a jump
     simulator.run(0.01)
     assert abs(simulator.summary()["numerical_energy"]) < 1e-3 * simulator.summary()["largest_energy"]
+
+
+def patched(part, **more):
+    """The strip of `wide`, whose lower layer ends at a part of its length."""
+    content = wide(**more)
+    content["rods"][0]["layers"][0]["interval"] = [0.0, part * content["rods"][0]["path"]["length"]]
+    return content
+
+
+@pytest.mark.parametrize("swelling", ["isotropic", "along"])
+@pytest.mark.parametrize("part", [0.35, 0.7])
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_derivatives_of_strips_agree_with_differences_where_a_layer_ends(swelling, part, dimension):
+    problem = Problem(patched(part, swelling=swelling), np.random.default_rng(1), "laminate", dimension=dimension)
+    assert problem.model.off_axis.exists
+    check(problem, ("flattening",))
+    check(problem)
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_the_work_of_a_stimulus_on_a_strip_off_its_axis_is_what_it_gains(dimension):
+    content = patched(0.4, stations=15) | {"gravity": [0.0, 0.0, -9.81]}
+    ramp = {"type": "ramp", "start": 0.005, "end": 0.015, "from": 0.4, "to": 1.0}
+    content["stimuli"]["humidity"]["schedule"] = ramp
+    content["solver"] = {"integrator": "sdirk2", "dt": 2e-5, "newton_tolerance": 1e-10}
+    simulator = Simulator(load_scene(content), model="laminate", dimension=dimension, budget=True)
+    simulator.run(0.02)
+    simulator.set_stimulus("humidity", 0.2)  # a jump
+    simulator.run(0.01)
+    assert abs(simulator.summary()["numerical_energy"]) < 1e-3 * simulator.summary()["largest_energy"]
+
+
+@pytest.mark.parametrize("part", [0.6, 0.4])
+def test_strips_curl_as_far_whichever_of_their_parts_has_the_curve_on_its_axis(part):
+    curvature = 6.0 * THICKNESS / WIDTH**2
+    law = {"stimulus": "heat", "gain": curvature * THICKNESS / 1.5}
+    half = {"thickness": 0.5 * THICKNESS}
+    layers = [layer("bottom", eigenstrain=law, interval=[0.0, 0.2 * part], **half), layer("top", **half)]
+    strip = rod(layers, length=0.2, stations=41, width=WIDTH, clamp_start="wall", section="strip")
+    heat, gel = {"heat": {"schedule": {"type": "hold", "value": 0}}}, {"gel": {**GEL, "poisson_ratio": 0.3}}
+    content = scene([strip], bodies=[fixed()], materials=gel, stimuli=heat)
+    simulator = Simulator(load_scene(content), model="laminate", dimension=2)
+    for value in np.geomspace(0.05, 1.0, 20):
+        simulator.set_stimulus("heat", value)
+        simulator.solve_static()
+    assert simulator.curvatures[[4, 10, 30]] / curvature == pytest.approx([0.863, 0.863, 0.0], abs=1e-3)
+
+
+@pytest.mark.parametrize("part", [0.6, 0.4])
+def test_strips_are_as_stiff_whichever_of_their_parts_has_the_curve_on_its_axis(part):
+    thickness, moment = 0.5 * THICKNESS, 36.0 * GEL["youngs_modulus"] * (0.5 * THICKNESS) ** 4 / (12.0 * WIDTH)
+    layers = [layer("bottom", thickness, interval=[0.0, 0.05 * part]), layer("top", thickness)]
+    crank = {"name": "crank", "position": [0.05, 0, 0], "motion": {"type": "free", "mass": 1e-3, "inertia": [1e-7] * 3}}
+    ends = {"clamp_start": "wall", "clamp_end": "crank"}
+    strip = rod(layers, length=0.05, stations=41, width=WIDTH, section="strip", **ends)
+    load = {"name": "moment", "body": "crank", "moment": [0, -moment, 0]}
+    gel = {"gel": {**GEL, "poisson_ratio": 0.5}}
+    content = scene([strip], bodies=[fixed(), crank], loads=[load], materials=gel)
+    simulator = Simulator(load_scene(content), model="laminate")
+    simulator.solve_static()
+    for node, high in ((5, THICKNESS), (35, thickness)):
+        curvature = abs(float(simulator.curvatures[node]))
+        wanted = PlateStrip(0.5).stiffness(WIDTH**2 * curvature / high)
+        bending = GEL["youngs_modulus"] * WIDTH * high**3 / 12.0
+        assert moment / (bending * curvature) == pytest.approx(wanted, rel=1e-4) != 1.0
+
+
+def test_a_strip_that_thins_curls_as_much_as_it_is_thin():
+    profile = {"at": [0.0, 0.2], "value": [0.5 * THICKNESS, 0.4 * THICKNESS]}
+    law = {"stimulus": "heat", "gain": 6.0 * (THICKNESS / WIDTH) ** 2 / 1.5}
+    layers = [layer("bottom", profile, eigenstrain=law), layer("top", profile)]
+    strip = rod(layers, length=0.2, stations=41, width=WIDTH, clamp_start="wall", section="strip")
+    heat, gel = {"heat": {"schedule": {"type": "hold", "value": 0}}}, {"gel": {**GEL, "poisson_ratio": 0.3}}
+    content = scene([strip], bodies=[fixed()], materials=gel, stimuli=heat)
+    simulator = Simulator(load_scene(content), model="laminate", dimension=2)
+    for value in np.geomspace(0.05, 1.0, 20):
+        simulator.set_stimulus("heat", value)
+        simulator.solve_static()
+    for node in (5, 20, 35):
+        thickness = THICKNESS * (1.0 - 0.2 * node / 40)
+        curvature = 6.0 * (THICKNESS / WIDTH) ** 2 / thickness
+        found = PlateStrip(0.3).swollen_curvature(WIDTH**2 * curvature / thickness)
+        assert simulator.curvatures[node] / curvature == pytest.approx(found, rel=2e-3)
 
 
 def test_two_rods_refuse_strips():

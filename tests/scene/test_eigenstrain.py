@@ -56,10 +56,12 @@ def test_one_law_is_written_without_a_list_and_several_are_read_back_the_same():
     assert parse_scene(scene_text(config), "text") == config
 
 
-def limited(*laws):
+def limited(*laws, **more):
     """Lines of the error that refuses a layer with these laws; none if it is accepted."""
+    content = driven(list(laws), **more)
+    content["rods"][0]["section"] = "strip" if more else "auto"
     try:
-        load_scene(driven(list(laws)))
+        load_scene(content)
     except SceneError as error:
         return str(error).splitlines()
     return []
@@ -102,6 +104,22 @@ def test_the_least_rest_length_counts_laws_where_and_when_they_meet(laws, reache
     assert len(told) == (reached is not None)
     assert reached is None or f"can take its eigenstrain to {reached};" in told[0]
     assert len(laws) == 1 or reached is None or "with the laws that act there too" in told[0]
+
+
+@pytest.mark.parametrize(
+    ("along", "across", "gain", "reached"),
+    [
+        (1.0, 0.5, -0.999, None),
+        (0.0, 2.0, -0.6, "-120 %"),
+        (0.2, 0.5, -1.5, None),
+        (1.0, -2.0, 0.7, "-140 %"),
+    ],
+)
+def test_the_least_rest_length_counts_what_fibres_multiply(along, across, gain, reached):
+    fibres = {"angle": 0.4, "along": {"swelling": along}, "across": {"swelling": across}}
+    told = limited(of("humidity", gain), fibres=fibres)
+    assert len(told) == (reached is not None)
+    assert reached is None or f"can take its eigenstrain to {reached};" in told[0]
 
 
 @pytest.mark.parametrize("model", ["laminate", "two_rod"])

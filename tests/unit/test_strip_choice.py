@@ -1,15 +1,15 @@
 """Which rods are strips, by how much that differs from a beam, and what cannot be a strip."""
 
-import math
-
 import pytest
-from support.sample_scenes import GROUND, contact, layer, rod, scene
+from support.sample_scenes import GEL, GROUND, contact, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SceneError
 from bilayer_core.model.edge_figures import edge_figures
 from bilayer_core.model.plan import simplest_model
-from bilayer_core.model.strip_choice import departure, folding_ratio, plates, section_of
+from bilayer_core.model.plate_section import plate_section
+from bilayer_core.model.plate_strip import folding_ratio
+from bilayer_core.model.strip_choice import departure, law_of, plates, section_of
 from bilayer_core.model.validity import validity_figures
 
 HEAT = {"heat": {"schedule": {"type": "hold", "value": 1}}}
@@ -36,7 +36,8 @@ def chosen(**how):
         ({"swelling": "along"}, "strip"),  # its curvature is that of a beam, its stiffness is not
         ({"swelling": "across", "width": 1e-3}, "strip"),  # which a beam does not feel
         ({"section": "beam"}, "beam"),
-        ({"more": {"interval": [0, 0.1]}}, "beam"),
+        ({"more": {"interval": [0, 0.1]}}, "strip"),
+        ({"more": {"natural_twist": 2.0}}, "beam"),
         ({"coupling": {"translation": 5.0}}, "beam"),
     ],
 )
@@ -65,25 +66,46 @@ def test_the_height_of_a_section_is_what_layers_that_swell_across_make_of_it():
     assert heights == {"across": ["2.25 mm across"], "along": [], "isotropic": ["0.205 mm across"]}
 
 
-def test_the_width_from_which_on_strips_fold_is_that_of_the_plate():
-    assert folding_ratio(0.5) == pytest.approx(8.7, abs=0.1)
-    assert folding_ratio(0.3) == pytest.approx(10.7, abs=0.1)
-    assert folding_ratio(0.0) > folding_ratio(0.1)
-    assert not math.isnan(folding_ratio(-0.5))
+@pytest.mark.parametrize(("poisson", "ratio"), [(0.5, 8.7), (0.3, 10.7)])
+def test_the_width_from_which_on_strips_fold_is_that_of_the_plate(poisson, ratio):
+    gel = {"gel": {**GEL, "poisson_ratio": poisson}}
+    loaded = load_scene(wide(materials=gel))
+    assert folding_ratio(law_of(loaded, loaded.rods[0])) == pytest.approx(ratio, abs=0.1)
+
+
+def test_the_height_and_the_fold_of_layers_of_unlike_ratio_are_those_of_their_own_law():
+    gels = {name: {**GEL, "poisson_ratio": ratio} for name, ratio in (("low", 0.1), ("high", 0.49))}
+    content = wide("strip", materials=gels, contact=contact(2e-4), obstacles=[GROUND | {"point": [0, 0, -1]}])
+    for own, name in zip(content["rods"][0]["layers"], gels, strict=True):
+        own["material"] = name
+    loaded = load_scene(content)
+    law, told = law_of(loaded, loaded.rods[0]), {figure.what: figure for figure in validity_figures(loaded)}
+    limit = folding_ratio(law)
+    assert law.folds(1.01 * limit) and not law.folds(0.99 * limit)
+    assert f"at most {limit:.3g} (" in told["as a strip it swells up to w²κ/H of"].limit
+    natural = plate_section(loaded, loaded.rods[0]).natural(1)
+    assert natural.across == pytest.approx(natural.along, rel=1e-12)
+    height = 0.006667 * abs(natural.across) * 0.03**2 / 8.0
+    assert told["its section rises by"].value == f"{1e3 * height:.3g} mm across"
 
 
 @pytest.mark.parametrize(
     ("more", "reason"),
     [
         ({"interval": [0, 0.1]}, "needs layers that cover all of it, and q has an `interval`; allowed: beam"),
-        ({"natural_twist": 2.0}, "takes its twist from its path, and q has a `natural_twist`"),
         ({"thickness": {"at": [0, 0.2], "value": [0.2e-3, 0.3e-3]}}, "needs one thickness all along it"),
         ({"stiffness": {"at": [0, 0.2], "value": [1, 2]}}, "needs one stiffness all along it"),
     ],
 )
-def test_a_strip_that_cannot_be_computed_is_refused_with_the_reason(more, reason):
-    with pytest.raises(SceneError, match=reason):
-        Simulator(load_scene(wide("strip", more=more)))
+def test_a_strip_with_fibres_that_cannot_be_computed_is_refused_with_the_reason(more, reason):
+    with pytest.raises(SceneError, match=f"strip of fibres or of unlike poisson_ratio {reason}"):
+        Simulator(load_scene(wide("strip", more={**more, "fibres": {"angle": 0.5}})))
+    Simulator(load_scene(wide("strip", more=more)))
+
+
+def test_a_strip_takes_its_twist_from_its_path():
+    with pytest.raises(SceneError, match="takes its twist from its path, and q has a `natural_twist`"):
+        Simulator(load_scene(wide("strip", more={"natural_twist": 2.0})))
 
 
 def test_round_rods_are_no_strips():
@@ -133,7 +155,7 @@ def test_a_beam_whose_layers_swell_along_it_alone_is_told_its_stiffness_and_no_c
     assert not any("swelling alike" in what for what in told)
 
 
-PART = {"more": {"interval": [0, 0.1]}}
+TWISTED = {"more": {"natural_twist": 2.0}}
 
 
 @pytest.mark.parametrize(
@@ -142,7 +164,7 @@ PART = {"more": {"interval": [0, 0.1]}}
         ({}, "auto", ""),
         ({"section": "beam"}, "auto", ""),
         ({}, "two_rod", "model laminate"),
-        (PART, "auto", "interval"),
+        (TWISTED, "auto", "natural_twist"),
     ],
 )
 def test_a_run_warns_of_a_wide_rod_that_cannot_be_a_strip(how, model, warned):

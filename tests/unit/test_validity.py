@@ -9,8 +9,10 @@ from bilayer_core.model.edge_figures import EdgeFigures
 from bilayer_core.model.findings import told as told_of
 from bilayer_core.model.implausible_numbers import implausible_numbers
 from bilayer_core.model.plan import make_plan
-from bilayer_core.model.plate_strip import curved_stiffness, folds, swollen_curvature
+from bilayer_core.model.plate_section import plate_section
+from bilayer_core.model.strip_choice import law_of
 from bilayer_core.model.validity import validity_figures, validity_warnings
+from bilayer_core.verification.validate.strips import UNLIKE_RESTS
 
 HEAT = {"heat": {"schedule": {"type": "hold", "value": 1.0}}}
 
@@ -170,20 +172,39 @@ IN_SPACE = {0.3: {2.6: 0.936, 4.3: 0.886, 6.0: 0.862, 10.0: 0.966, 20.0: 1.129}}
 OF_A_PLATE = {0.5: {0.5: 0.998, 2.0: 0.971, 4.3: 0.918, 6.0: 0.919, 10.0: 1.156, 36.0: 1.38, 100.0: 1.432}}
 
 
+def law(lower, upper):
+    """The law of a strip of two equal layers with these Poisson's ratios, the lower of which swells, and κ̄ of a narrow
+    one over that of layers of one ratio.
+    """
+    gels = {name: {**GEL, "poisson_ratio": ratio} for name, ratio in (("lower", lower), ("upper", upper))}
+    layers = [layer(name, material=name) for name in gels]
+    layers[0]["eigenstrain"] = {"stimulus": "heat", "gain": 0.01}
+    loaded = load_scene(scene([rod(layers)], stimuli=HEAT, materials=gels))
+    return law_of(loaded, loaded.rods[0]), plate_section(loaded, loaded.rods[0]).growth[3]
+
+
 def test_the_curvature_of_a_wide_strip_is_that_of_independent_programs():
     for table, tolerance in ((IN_SPACE, 0.013), (OF_A_PLATE, 0.002)):
         for poisson, figures in table.items():
-            computed = swollen_curvature(np.array(list(figures)), poisson)
+            computed = law(poisson, poisson)[0].curvature(np.array(list(figures)))
             np.testing.assert_allclose(computed, list(figures.values()), rtol=tolerance)
     for poisson in (0.3, 0.5):
-        assert swollen_curvature(np.array([1e-3, 1e9]), poisson) == pytest.approx([1.0, 1.0 + poisson], abs=0.01)
-        assert curved_stiffness(np.array([1e-3, 1e9]), poisson) == pytest.approx([1.0, 1.0 / (1.0 - poisson**2)], 1e-3)
+        strip, _ = law(poisson, poisson)
+        assert strip.curvature(np.array([1e-3, 1e9])) == pytest.approx([1.0, 1.0 + poisson], abs=0.01)
+        assert strip.stiffness(np.array([1e-3, 1e9])) == pytest.approx([1.0, 1.0 / (1.0 - poisson**2)], 1e-3)
+
+
+def test_the_curvature_of_layers_of_unlike_ratios_is_that_of_a_plate_solved_across_its_width():
+    strip, narrow = law(0.1, 0.49)
+    ratios = np.array(list(UNLIKE_RESTS))
+    assert narrow * strip.curvature(narrow * ratios) == pytest.approx(list(UNLIKE_RESTS.values()), rel=1e-3)
 
 
 def test_a_swollen_strip_folds_from_the_width_on_at_which_its_tangent_turns_negative():
     for poisson, ratio in ((0.5, 8.7), (0.3, 10.7)):
-        assert not folds(0.98 * ratio, poisson)
-        assert folds(1.02 * ratio, poisson)
+        strip, _ = law(poisson, poisson)
+        assert not strip.folds(0.98 * ratio)
+        assert strip.folds(1.02 * ratio)
 
 
 def test_the_deflection_by_shear_is_that_of_timoshenko_and_of_a_slab_between_stiff_films():

@@ -9,15 +9,19 @@ import math
 import numpy as np
 
 from bilayer_core.kinematics.frame_strains import rest_strains
+from bilayer_core.kinematics.rotation import rotation_matrix
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.closed_forms import PlateStrip
+from bilayer_core.verification.validate.motion import put
 from bilayer_core.verification.validate.parts import GEL, fixed, layer, rod, scene
 from bilayer_core.verification.validate.validation_case import Case
 
 WIDTH, THICKNESS = 20e-3, 0.2e-3
 RATIOS = (0.1, 1, 3, 6, 10, 36, 100)
 """w²κ₀/H, with the curvature κ₀ of a narrow strip."""
+SLANTS = (0.5, 1, 2)
+"""τ/κ of developable ribbons."""
 BENT = (1, 5, 36)
 """w²κ/H of a straight strip that a moment bends about as far."""
 
@@ -105,6 +109,27 @@ def of_unlike_ratios(ratio: float) -> float:
     law = {"stimulus": "heat", "gain": curvature * THICKNESS / 1.5}
     layers = [layer("bottom", 0.5 * THICKNESS, "low", eigenstrain=law), layer("top", 0.5 * THICKNESS, "high")]
     return _rest(_loaded(layers, UNLIKE, 2), tuple(np.geomspace(0.05, 1.0, 20)))[0] / curvature
+
+
+def developable(slant: float, ratio: float) -> float:
+    """Return the energy of a very thin ribbon in a helix, of the twist over the curvature `slant`, over Sadowsky's
+    ½ D w (κ² + τ²)²/κ², by its w²κ/H.
+    """
+    thickness, edges, poisson = 1e-4 * WIDTH, 40, 0.3
+    curvature, turned = ratio * thickness / WIDTH**2, 5e-3  # of each joint
+    length = edges * turned / curvature
+    ribbon = rod([layer("only", thickness)], length, edges + 1, width=WIDTH, section="strip")
+    gel = {"gel": {**GEL, "poisson_ratio": poisson}}
+    simulator = Simulator(load_scene(scene([ribbon], materials=gel)), model="laminate", dimension=3)
+    turns = [np.eye(3)]
+    for _ in range(edges - 1):
+        turns.append(turns[-1] @ rotation_matrix(turned * np.array([slant, -1.0, 0.0])))
+    tangents, normals = np.array(turns)[:, :, 0], np.array(turns)[:, :, 2]
+    ends = np.cumsum(tangents, axis=0) * length / edges
+    put(simulator, position=np.concatenate([np.zeros((1, 3)), ends]), director1=normals)
+    plate = GEL["youngs_modulus"] * thickness**3 / (12.0 * (1.0 - poisson**2))
+    bent = 0.5 * plate * WIDTH * curvature**2 * (1.0 + slant**2) ** 2 * length * (edges - 1) / edges
+    return sum(simulator.energy().values()) / bent
 
 
 UNLIKE = {"low": 0.1, "high": 0.49}
@@ -198,6 +223,15 @@ CASES += [
         scale=1.0,
     )
     for which, name, answer in ((0, "curvature", 0.7 * 0.75), (1, "twist", 0.7 * math.sqrt(3.0) / 4.0))
+]
+CASES += [
+    Case(
+        f"strips/developable ribbon, τ/κ {slant:g}/w²κ/H 1e6",
+        "Sadowsky's ½ D w (κ² + τ²)²/κ²",
+        2e-3,
+        lambda slant=slant: (developable(slant, 1e6), 1.0),
+    )
+    for slant in SLANTS
 ]
 CASES += [
     Case(
