@@ -45,7 +45,6 @@ bounds: $(TESTS)  ## Run tests of all kernels with the bounds of arrays checked.
 stress: $(TESTS)  ## Run a hundred stress cases, about three minutes.
 	$(BIN)/bilayer stress --quick --no-shrink --out runs/stress_quick
 
-# What is found is committed: docs/stability.md with its figures, and the notes in docs/data that it shows.
 verify: bounds  ## Run what takes hours: long tests, bounds, all stress cases, 10,000 mutated scenes, 2,000 logs, 250 kills, a soak, films, seeded bugs.
 	command -v chromium >/dev/null || $(BIN)/playwright install --with-deps chromium
 	$(BIN)/python -m pytest -m verify -n $(JOBS) --dist worksteal
