@@ -64,7 +64,9 @@ def page(address):
 
 def test_the_reference_has_every_public_name(site):
     with (site / "objects.inv").open("rb") as file:
-        listed = {name for objects in InventoryFile.load(file, "", lambda *parts: parts[-1]).values() for name in objects}
+        listed = {
+            name for objects in InventoryFile.load(file, "", lambda *parts: parts[-1]).values() for name in objects
+        }
     public = {f"bilayer_core.{name}" for name in bilayer_core.__all__} - {"bilayer_core.__version__"}
     assert public <= listed
 
