@@ -45,7 +45,6 @@ bounds: $(TESTS)  ## Run tests of all kernels with the bounds of arrays checked.
 stress: $(TESTS)  ## Run a hundred stress cases, about three minutes.
 	$(BIN)/bilayer stress --quick --no-shrink --out runs/stress_quick
 
-# What is found is committed: docs/stability.md with its figures, and the notes in docs/data that it shows.
 verify: bounds  ## Run what takes hours: long tests, bounds, all stress cases, 10,000 mutated scenes, 2,000 logs, 250 kills, a soak, films, seeded bugs.
 	command -v chromium >/dev/null || $(BIN)/playwright install --with-deps chromium
 	$(BIN)/python -m pytest -m verify -n $(JOBS) --dist worksteal
@@ -59,6 +58,12 @@ verify: bounds  ## Run what takes hours: long tests, bounds, all stress cases, 1
 	$(BIN)/python tests/benchmarks/sweeps.py
 	$(BIN)/bilayer stress --out runs/stress
 	SEEDED_BUGS='*' $(BIN)/python -m pytest -m "" -v -n $(JOBS) tests/mutations
+
+docs: $(TESTS)  ## Build the site of the pages: build/site.
+	$(BIN)/python -m sphinx -W --keep-going -q -d build/doctrees docs build/site
+
+evidence: $(TESTS)  ## Compute all cases with a known answer, about 20 minutes; `make docs` shows the tables.
+	$(BIN)/bilayer validate --out runs/validation
 
 # The commands are those of the page.
 gallery: $(STAMP)  ## Draw the pictures of docs/gallery.md anew.
@@ -96,7 +101,7 @@ wheel: $(STAMP)  ## Compile the engine into a wheel for this platform, which lea
 
 # What the system must supply: Python's module venv, and Mesa's software drivers, which need no graphics card: of OpenGL for
 # pictures and films (`bilayer render`), of Vulkan for those of the viewer (`bilayer view --screenshot`). `make test` needs
-# the browser Chromium as well, for `bilayer view --web`: the package of Debian, or where there is none that of Playwright.
+# the browser Chromium as well, for the site and `bilayer view --web`: the package of Debian, or where there is none that of Playwright.
 # Debian and Ubuntu packages are installed where this command may, else the line to paste is printed.
 system:
 	@command -v $(PYTHON) >/dev/null || { \
@@ -113,7 +118,7 @@ system:
 	PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p | grep -q libEGL.so.1 && \
 	    PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p | grep -q libEGL_ || \
 	    missing="$$missing libegl1 libegl-mesa0 libgl1-mesa-dri"; \
-	$(if $(filter verify,$(MAKECMDGOALS)),! grep -qx ID=debian /etc/os-release || command -v chromium >/dev/null || missing="$$missing chromium";) \
+	$(if $(filter test verify,$(MAKECMDGOALS)),! grep -qx ID=debian /etc/os-release || command -v chromium >/dev/null || missing="$$missing chromium";) \
 	test -n "$$missing" || exit 0; \
 	if test "$$(id -u)" = 0; then sudo=; elif sudo -n true 2>/dev/null; then sudo=sudo; else sudo=no; fi; \
 	if test "$$sudo" != no && command -v apt-get >/dev/null; then \
@@ -124,4 +129,4 @@ system:
 	printf '\nSystem packages are missing. Install them with this line, then run make again:\n\n' >&2; \
 	printf '    sudo apt-get update && sudo apt-get install %s\n\n' "$$(echo $$missing)" >&2; exit 1
 
-.PHONY: help demo test bounds stress verify gallery lint install kernels wheel clean system
+.PHONY: help demo test bounds stress verify docs evidence gallery lint install kernels wheel clean system

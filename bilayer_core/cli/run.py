@@ -45,7 +45,7 @@ RATE_ROUNDING = 1e-9
 @click.option("--dt", metavar="TIME", help="Fixed steps of this length; with --tolerance the first one.")
 @click.option("--model", metavar="NAME", help="auto, two_rod or laminate.")
 @click.option("--dimension", metavar="D", help="auto, 2 or 3.")
-@click.option("--integrator", metavar="NAME", help="auto, or a name from docs/scene_keys.md (solver).")
+@click.option("--integrator", metavar="NAME", help="auto, or a name of `solver.integrator` in `bilayer schema`.")
 @click.option("--tolerance", metavar="X", help=TOLERANCE_HELP)
 @set_option
 @click.option("--stimulus", multiple=True, metavar="CHANNEL=VALUE", help=INSTEAD)

@@ -269,7 +269,7 @@ def kinds() -> dict[str, Kind]:
 
 
 def markdown_table() -> str:
-    """Return the list as a table for `docs/equations.md`."""
+    """Return the list as a table for the site's page of equations."""
     rows = ["| force | its energy is | formula |", "| --- | --- | --- |"]
     for force in FORCES:
         meaning = force.kind.value if force.kind else "none of its own: it acts through other forces"

@@ -20,25 +20,33 @@ from bilayer_core.scene.units import (
     PositiveNumber,
 )
 
-# Orders of magnitude. docs/stimuli.md names their sources, and says what is published and what is assumed.
+# Orders of magnitude. Each has what is published, and what is assumed.
 LAWS: dict[str, dict[str, float]] = {
-    # of the relative humidity, 0 to 1
+    # Of the relative humidity, 0 to 1. Published: films of poly(N-vinylcaprolactam) swell by up to 4 % below 40 %
+    # humidity and respond within seconds ("Applicability of Vapor-Deposited Thermoresponsive Hydrogel Thin Films in
+    # Ultrafast Humidity Sensors/Actuators", figshare 11604297); they are far thinner than a millimetre. Assumed: the
+    # same along a strip; drying half as fast; saturation.
     "humidity_hydrogel": {
         "gain": 0.1,
         "time_constant_rising": 2.0,
         "time_constant_falling": 4.0,
         "saturation": 0.1,
     },
-    # of the temperature in degrees Celsius
+    # Of the temperature in degrees Celsius. Assumed: 3e-4 1/K, the order of silicone elastomers; h²/(π² a) of
+    # conduction with h = 1 mm, a = 1e-7 m²/s.
     "temperature_elastomer": {
         "gain": 3e-4,
         "reference": 20.0,
         "time_constant_rising": 1.0,
         "time_constant_falling": 1.0,
     },
-    # of light, 1 for about 0.5 W/cm²
+    # Of light, 1 for about 0.5 W/cm². Published: response in 1 s, relaxation in 3 s at 550 mW/cm²
+    # ("Graphene-polydimethylsiloxane/chromium bilayer-based flexible, reversible, and large bendable photomechanical
+    # actuators"). Assumed: that these are time constants; the gain, 3e-4 1/K over 60 K.
     "light_photothermal": {"gain": 0.018, "time_constant_rising": 1.0, "time_constant_falling": 3.0},
-    # of a heating current, 1 for full drive
+    # Of a heating current, 1 for full drive. Published: nickel-titanium contracts by as much as 8 % (ASME IMECE2002,
+    # p. 277). Assumed: gain and time constants. Hysteresis, and heating with the square of the current, are not
+    # modelled.
     "current_sma": {
         "gain": -0.04,
         "time_constant_rising": 0.3,

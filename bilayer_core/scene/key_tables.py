@@ -19,7 +19,7 @@ from bilayer_core.scene.units import Count, Quantity
 INTRODUCTION = """\
 # Every key of a scene file
 
-Made by `bilayer schema --markdown` from the classes that read scene files; do not edit it.
+Made by `bilayer schema --markdown` from the classes that read scene files.
 
 - Plain numbers are in the unit of the column *unit*. Texts with a unit are converted: `1 mm`, `100 MPa`, `50 %`.
 - A key with the default **required** must be given wherever its mapping is. Unknown keys are refused.

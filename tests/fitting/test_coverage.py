@@ -1,4 +1,4 @@
-"""Twelve fits of the study of docs/fitting.md: its 500 are made by `python tests/benchmarks/fit_coverage.py`."""
+"""Twelve fits of the study of coverage; `python tests/benchmarks/fit_coverage.py` makes its 500."""
 
 import numpy as np
 import pytest

@@ -129,7 +129,7 @@ def test_a_slow_release_does_not_make_it_jump():
 )
 def test_without_a_damping_the_rise_scatters_by_a_few_percent_about_one_value(change):
     _, flight = watched(*change)
-    assert flight.rise == pytest.approx(0.354, rel=0.05)  # 344 to 371 mm over 14 step lengths: see docs/robots.md
+    assert flight.rise == pytest.approx(0.354, rel=0.05)  # 344 to 371 mm over 14 step lengths
 
 
 @pytest.mark.parametrize(

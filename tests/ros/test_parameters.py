@@ -74,9 +74,3 @@ def test_every_default_is_allowed(table):
 def test_no_name_of_a_parameter_is_the_prefix_of_another(table):
     names = {*BUILT_IN, *(parameter.name for parameter in table)}
     assert not [name for name in names for other in names if other.startswith(f"{name}.")]
-
-
-@pytest.mark.parametrize("parameter", REPLAY_NODE, ids=lambda parameter: parameter.name)
-def test_the_page_tells_every_parameter_of_the_player_with_its_default(root, parameter):
-    default = {"": "empty"}.get(parameter.default, f"`{str(parameter.default).replace('False', 'false')}`")
-    assert f"\n| `{parameter.name}` | {default} | " in (root / "docs/ros2.md").read_text(encoding="utf-8")

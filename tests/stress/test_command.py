@@ -1,6 +1,7 @@
 """The verb `stress`, as it is called."""
 
 import json
+import re
 import subprocess
 import sys
 from functools import partial
@@ -31,7 +32,9 @@ def test_results_report_and_scenes_are_written_and_gone_on_with(tmp_path, capfd,
     assert written >= {"results.jsonl", "stability.md", "stability_axes.png", "stability_effort.png"}
     assert json.loads(table.read_text())["results"][0]["name"] == ONE
     page = (out / "stability.md").read_text()
-    assert "| inside | 1 | 1 | 0 | 0 | 0 |" in page and "## Seeded bugs" in page and "capstan" in page
+    assert "| inside | 1 | 1 | 0 | 0 | 0 |" in page and "capstan" in page
+    pictures = re.findall(r"!\[.*?\]\((.*?)\)", page)
+    assert len(pictures) == 2 and all((out / picture).is_file() for picture in pictures)
     before = (out / "results.jsonl").read_text()
     monkeypatch.setattr(outcome_pictures, "draw", lambda records, directory: [])
     assert main(["stress", "--only", ONE, "--out", str(out), "--resume", "--workers", "1"]) == 0

@@ -12,7 +12,7 @@ import yaml
 
 import bilayer_core
 
-LEFT_OUT = {".ci/run", ".gitignore"}
+LEFT_OUT = {".ci/run", ".gitignore", ".readthedocs.yaml"}
 """Files that only a clone needs."""
 MADE = re.compile(r"PKG-INFO|setup\.cfg|bilayer_sim_ros\.egg-info/.*")
 """Files that setuptools adds."""

@@ -11,7 +11,7 @@ from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.errors import ForceError
 from bilayer_core.model import force_list
 from bilayer_core.model.build_model import build_model
-from bilayer_core.model.force_list import FORCES, Force, Kind, markdown_table
+from bilayer_core.model.force_list import FORCES, Force, Kind
 from bilayer_core.model.force_slots import NAMES, slot_of
 
 SPRING = Force("spring", Kind.CONSERVATIVE, "spring.py", lambda _: None)
@@ -59,11 +59,9 @@ def test_plan_energies_and_budget_name_the_same_forces(description, settings):
     ]
 
 
-def test_every_force_has_its_formula_in_a_file_and_the_page_of_equations_lists_it(root):
+def test_every_force_has_its_formula_in_a_file(root):
     for force in FORCES:
         assert (root / "bilayer_core/forces" / force.formula).is_file()
-    page = (root / "docs/equations.md").read_text(encoding="utf-8")
-    assert markdown_table() in page, "copy what `model.force_list.markdown_table` returns to docs/equations.md"
 
 
 def test_places_are_those_of_the_list():

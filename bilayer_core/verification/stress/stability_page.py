@@ -14,12 +14,6 @@ from bilayer_core.verification.stress.stress_case import Outcome, Record
 from bilayer_core.verification.stress.torture import NOT_EXPRESSIBLE, TORTURES
 
 PAGE = "stability.md"
-DATA = Path(__file__).resolve().parents[2] / "docs" / "data"
-NOTES = (
-    ("Mutated scenes", "mutated_scenes.md", 'FUZZ_SCENES=10000 pytest -m "" tests/fuzz'),
-    ("Seeded bugs", "seeded_bugs.md", "SEEDED_BUGS='*' pytest -m \"\" tests/mutations"),
-)
-"""Of what is tried in a checkout alone: title, file in `DATA`, and command."""
 LEAST_ACCURATE, MOST_REFUSED, LEAST_REMEDIES = 0.70, 0.05, 0.90
 """Parts of the cases inside the region, and of the remedies tried."""
 
@@ -100,8 +94,8 @@ def _page(journal: Journal) -> Iterator[str]:
     records, head = list(journal.records.values()), journal.head
     yield "# Numerical stability"
     yield ""
-    yield "Made by `bilayer stress --out DIR` as DIR/stability.md; do not edit it. The judge and its limits"
-    yield "are in `bilayer_core/testing/judge.py`; in `bilayer_core/verification/stress`, `region.py` has the region of"
+    yield "Made by `bilayer stress --out DIR` as DIR/stability.md. The judge and its limits are in"
+    yield "`bilayer_core/testing/judge.py`; in `bilayer_core/verification/stress`, `region.py` has the region of"
     yield "validity, `matrix.py` and `torture.py` the cases."
     yield ""
     machine = head["machine"]
@@ -122,7 +116,6 @@ def _page(journal: Journal) -> Iterator[str]:
     yield from _extremes(records)
     yield from _worst_cases(records)
     yield from _torture_cases(records)
-    yield from _notes()
 
 
 def _outcomes(records: Sequence[Record]) -> Iterator[str]:
@@ -136,9 +129,9 @@ def _outcomes(records: Sequence[Record]) -> Iterator[str]:
     refused, worked = remedies(records)
     yield f"{refused} cases were refused; what the message says to change was done, and works in {worked} of them."
     yield ""
-    yield "![Outcomes by axis](images/stability_axes.png)"
+    yield "![Outcomes by axis](stability_axes.png)"
     yield ""
-    yield "![Effort and error](images/stability_effort.png)"
+    yield "![Effort and error](stability_effort.png)"
     yield ""
 
 
@@ -192,15 +185,6 @@ def _torture_cases(records: Sequence[Record]) -> Iterator[str]:
     yield ""
     yield from (f"- {number} {name}: {why}" for number, name, why in NOT_EXPRESSIBLE)
     yield ""
-
-
-def _notes() -> Iterator[str]:
-    """Yield the results of tests that run only in a checkout, as they were noted there."""
-    for title, file, command in NOTES:
-        path = DATA / file
-        yield f"## {title}"
-        yield ""
-        yield path.read_text(encoding="utf-8") if path.exists() else f"`{command}` has not been run.\n"
 
 
 def _table(titles: Sequence[str], rows: Sequence[Sequence[object]]) -> Iterator[str]:
