@@ -128,6 +128,17 @@ def strip_law(flattening, rest, i, k, kappa, psi):
     )
 
 
+@kernel
+def viscous_coupling(p, stage, i):
+    """Return β k₁₃ of strip joint i, and its κ₁ and ψ at the strains' origin: viscosity has β k₁₃ (κ₁ − κ₁°)(ψ − ψ°)
+    beside the squares of `forces.viscosity`.
+    """
+    k = p.flattening.joint[i]
+    lag = p.viscosity.joint_time[k, 0] / stage.length * p.flattening.coupling[i]
+    first = p.strands.edge_count + 3 * k
+    return lag, stage.origin_strain[first], stage.origin_strain[first + 2]
+
+
 @record
 class Sections:
     """The law of each strip joint at given strains."""
