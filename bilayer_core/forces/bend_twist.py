@@ -71,7 +71,7 @@ from __future__ import annotations
 import math
 
 from bilayer_core.forces.elements import acts_viscously
-from bilayer_core.forces.flattening import strip_law
+from bilayer_core.forces.flattening import strip_law, viscous_coupling
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.piece import Piece
 from bilayer_core.kinematics.vector import (
@@ -227,10 +227,17 @@ def _add_bending(strips: bool) -> Piece:
                 bond += 0.5 * (g1 * d1 + g2 * d2 + g3 * d3)
             if strips:
                 k13 = 0.0
-                if flattens and strip < flattening.joint.shape[0] and flattening.joint[strip] == k:
-                    energy, f1, f3, k11, k13, k33, _, _ = strip_law(flattening, stage.rest_joint, strip, k, kappa1, psi)
-                    strip, flattened, g1, g3 = strip + 1, flattened + energy, g1 + f1, g3 + f3
-                    k1, k3 = k1 + k11, k3 + k33
+                if strip < flattening.joint.shape[0] and flattening.joint[strip] == k:
+                    if flattens:
+                        energy, f1, f3, k11, k13, k33, _, _ = strip_law(
+                            flattening, stage.rest_joint, strip, k, kappa1, psi
+                        )
+                        flattened, g1, g3 = flattened + energy, g1 + f1, g3 + f3
+                        k1, k3 = k1 + k11, k3 + k33
+                    if viscous:
+                        lag, kappa0, psi0 = viscous_coupling(p, stage, strip)
+                        g1, g3, k13 = g1 + lag * (psi - psi0), g3 + lag * (kappa1 - kappa0), k13 + lag
+                    strip += 1
 
             # of κ₁, κ₂ and ψ, components 1 and 2: u, v, h with respect to a, w, z, j to b
             u1, u2 = -(s + r11 + kappa1 * p1) * ic, -(r21 + kappa1 * p2) * ic

@@ -38,7 +38,7 @@ from __future__ import annotations
 import math
 
 from bilayer_core.jit import kernel, piece, record
-from bilayer_core.jit.record import Matrix, Vector
+from bilayer_core.jit.record import Indices, Matrix, Vector
 from bilayer_core.kinematics.vector import angle, dot, row
 from bilayer_core.model.plate_strip import TERMS
 from bilayer_core.model.records.parts import Flattening
@@ -128,22 +128,37 @@ def strip_law(flattening, rest, i, k, kappa, psi):
     )
 
 
+@kernel
+def viscous_coupling(p, stage, i):
+    """Return β k₁₃ of strip joint i, and its κ₁ and ψ at the strains' origin: viscosity has β k₁₃ (κ₁ − κ₁°)(ψ − ψ°)
+    beside the squares of `forces.viscosity`.
+    """
+    k = p.flattening.joint[i]
+    lag = p.viscosity.joint_time[k, 0] / stage.length * p.flattening.coupling[i]
+    first = p.strands.edge_count + 3 * k
+    return lag, stage.origin_strain[first], stage.origin_strain[first + 2]
+
+
 @record
 class Sections:
-    """The law of each strip joint at given strains."""
+    """The law of strip joints at given strains."""
 
     rest: Matrix  # `Stage.rest_joint`
-    kappa: Vector  # κ₁, shape (n_strip_joint,)
+    strip: Indices  # strip joint of each, shape (n_section,)
+    kappa: Vector  # κ₁, likewise
     psi: Vector  # ψ, likewise
     pull: Vector  # ∂F/∂κ̄y Δl [N m], likewise
-    tangent: Matrix  # ∂²F/∂κ₁², ∂²F/∂κ₁∂ψ and ∂²F/∂ψ² [N m], shape (n_strip_joint, 3)
+    tangent: Matrix  # ∂²F/∂κ₁², ∂²F/∂κ₁∂ψ and ∂²F/∂ψ² [N m], shape (n_section, 3)
 
 
 @piece(int, Flattening, Sections)
 def write_sections(flattening, of):
     """Write the law for those who look at sections between steps."""
     for i in range(of.kappa.shape[0]):
-        _, _, _, k11, k13, k33, pull, _ = strip_law(flattening, of.rest, i, flattening.joint[i], of.kappa[i], of.psi[i])
+        strip = of.strip[i]
+        _, _, _, k11, k13, k33, pull, _ = strip_law(
+            flattening, of.rest, strip, flattening.joint[strip], of.kappa[i], of.psi[i]
+        )
         of.pull[i] = pull
         of.tangent[i, 0], of.tangent[i, 1], of.tangent[i, 2] = k11, k13, k33
     return 0

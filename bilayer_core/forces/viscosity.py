@@ -11,7 +11,8 @@ origin of positions, which in a rigid rotation differs from s. The stage minimis
     ½ k (s − s̄)² + ½ k β (s − s°)² = ½ k (1 + β) (s − s′)² + const,   β = τ/(γ h),   s′ = (s̄ + β s°)/(1 + β)
 
 so viscosity needs no elements of its own: those of elasticity have another stiffness and another rest strain
-(`forces.elements`), and energies are told apart afterwards (`add_viscosity`). Derivatives are theirs.
+(`forces.elements`), and energies are told apart afterwards (`add_viscosity`). Derivatives are theirs. Only k₁₃, by
+which fibres couple bending and twist, has its part by itself (`forces.flattening`); what flattens a section has none.
 
 Order. s(qᵢ) = sₙ + h Σ aᵢⱼ ṡⱼ defines ṡᵢ, whose difference eᵢ from the rate of s along the stage, ∂s/∂q·vᵢ, obeys
 h Σ aᵢⱼ eⱼ = ½ s″ v² (cᵢ² h² − 2 h² Σ aᵢⱼ cⱼ) + O(h³). At the end of the step of a method of order 2 that bracket is
@@ -40,6 +41,7 @@ from bilayer_core.forces.elements import (
     slot_of_pair,
     strains_of_pair,
 )
+from bilayer_core.forces.flattening import viscous_coupling
 from bilayer_core.jit import kernel, piece
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.step import Configuration, Stage
@@ -91,6 +93,10 @@ def add_viscosity(_, p, at, stage, with_hessian):
             )
             sums.energy[BOND if tied else TWISTING if c == 2 else BENDING] += of_elasticity
             lost += of_viscosity
+    for i in range(p.flattening.joint.shape[0]):
+        k = p.flattening.joint[i]
+        lag, kappa, psi = viscous_coupling(p, stage, i)
+        lost += lag * (at.joint_strain[k, 0] - kappa) * (at.joint_strain[k, 2] - psi)
     bonds, begin = p.bonds, edges + 3 * strands.joint_a.shape[0]
     for k in range(bonds.joint.shape[0]):
         strains = strains_of_pair(strands, bonds, at, k)

@@ -31,6 +31,8 @@ ACROSS = 2.0
 JUMP = 0.2
 """Step of curvature and twist from a joint to the next, over the largest natural ones of the strip, or else over its
 largest, that may be a jump."""
+CONVEX = 4.0
+"""x = √Λ κ₁, or √Λ ψ, natural or as it is, below which the law is convex: from 7.5 on some tangents are negative."""
 FOLDS = "folds: its parts are in two shapes of rest, and where these meet depends on the mesh"
 BETWEEN = np.linspace(0.0, 1.0, 17)
 """Where the law is looked at between the strains of two joints."""
@@ -51,9 +53,10 @@ def _natural(model: Model, rest: Array) -> tuple[Array, Array, Array]:
     return rest[strips.joint, 0], rest[strips.joint, 2], rest[strips.first :][: len(strips.joint), 0]
 
 
-def _law(model: Model, rest: Array, kappa: Array, psi: Array) -> Sections:
-    """Return the law of strip joints at strains κ₁ and ψ."""
-    of = Sections(rest=rest, kappa=kappa, psi=psi, pull=np.zeros(len(kappa)), tangent=np.zeros((len(kappa), 3)))
+def _law(model: Model, rest: Array, strips: Array, kappa: Array, psi: Array) -> Sections:
+    """Return the law of some strip joints at strains κ₁ and ψ."""
+    pull, tangent = np.zeros(len(kappa)), np.zeros((len(kappa), 3))
+    of = Sections(rest=rest, strip=strips, kappa=kappa, psi=psi, pull=pull, tangent=tangent)
     write_sections(model.flattening, of)
     return of
 
@@ -83,7 +86,7 @@ def curvatures(model: Model, state: State) -> tuple[Array, Array]:
     strips, inside, (kappa, psi), rest = model.flattening, _inside(model), _strains(model, state), _rest(model, state)
     along, twist, across = _natural(model, rest)
     free = across - strips.curl * (kappa - along) - strips.skew * (psi - twist)
-    curved = free - _law(model, rest, kappa, psi).pull * strips.scale**2 / strips.stiffness
+    curved = free - _law(model, rest, np.arange(len(kappa)), kappa, psi).pull * strips.scale**2 / strips.stiffness
     length = model.voronoi_length[strips.joint]
     place = np.arange(len(kappa))
     nearest = np.abs(place[:, None] - place[inside]).argmin(axis=1) if inside.any() else place
@@ -169,19 +172,18 @@ def _jumps(
     """
     joint = model.flattening.joint[own]
     length = model.voronoi_length[joint][:, None]
-    strain = np.stack([of[own] for of in strains], axis=1) / length
-    free = np.stack([of[own] for of in natural], axis=1) / length
-    sizes = (np.hypot(*of.T[:2]).max(initial=0.0) for of in (free, strain))
-    step, size = np.diff(strain, axis=0), next((size for size in sizes if size > 0.0), 0.0)
+    strain, free = (np.stack([of[own] for of in values], axis=1) / length for values in (strains, natural))
+    sizes = [np.hypot(*of.T[:2]) for of in (free, strain)]
+    x = model.flattening.scale[own] * length[:, 0] * np.max([*sizes, np.abs(free[:, 2])], axis=0)
+    if x.max(initial=0.0) < CONVEX:
+        return False
+    step, size = np.diff(strain, axis=0), next((of.max() for of in sizes if of.any()), 0.0)
     alike = np.abs(np.diff(free, axis=0)).max(axis=1, initial=0.0) <= JUMP * size
     far = np.flatnonzero((np.hypot(*step.T) > JUMP * size) & alike)
-    stiffness, (bend, twist) = model.rods.joint_stiffness[joint[far]], (step[far] * length[far]).T
-    for part in BETWEEN if len(far) else ():
-        kappa, psi = (of.copy() for of in strains)
-        kappa[own[far]] += part * bend
-        psi[own[far]] += part * twist
-        k11, k13, k33 = _law(model, rest, kappa, psi).tangent[own[far]].T
-        tangent = (stiffness[:, 0] + k11) * bend**2 + 2.0 * k13 * bend * twist + (stiffness[:, 2] + k33) * twist**2
-        if (tangent < 0.0).any():
-            return True
-    return False
+    way = step[far] * length[far]
+    between = strain[far, :, None] * length[far, :, None] + way[:, :, None] * BETWEEN
+    of = _law(model, rest, np.repeat(own[far], len(BETWEEN)), between[:, 0].ravel(), between[:, 1].ravel())
+    k11, k13, k33 = of.tangent.T.reshape(3, len(far), len(BETWEEN))
+    stiffness, (bend, twist) = model.rods.joint_stiffness[joint[far]], way.T[:, :, None]
+    tangent = (stiffness[:, :1] + k11) * bend**2 + 2.0 * k13 * bend * twist + (stiffness[:, 2:] + k33) * twist**2
+    return bool((tangent < 0.0).any())

@@ -131,15 +131,17 @@ def test_derivatives_of_strips_with_unlike_layers_in_a_plane_agree_with_differen
     check(problem)
 
 
-def bent_strip(change=lambda model: model):
-    """An evaluator of a free strip, and a configuration in which it is bent and twisted at random."""
+def bent_strip(change=lambda model: model, size=1.0, length=1e3):
+    """An evaluator of a free strip over a stage of a length [s], and a configuration in which it is bent and twisted at
+    random, by so much.
+    """
     content = wide() | {"bodies": []}
     content["rods"][0].pop("clamp_start")
-    evaluator, start = at_rest(change(build_model(load_scene(content), "laminate")), 1e3)
+    evaluator, start = at_rest(change(build_model(load_scene(content), "laminate")), length)
     model, rng, shape = evaluator.model, np.random.default_rng(2), evaluator.new()
     step = np.zeros(model.layout.size)
-    step[model.layout.node[:, None] + np.arange(3)] = 5e-5 * rng.standard_normal((model.node_count, 3))
-    step[model.layout.edge] = 0.2 * rng.standard_normal(model.rods.edge_count)
+    step[model.layout.node[:, None] + np.arange(3)] = 5e-5 * size * rng.standard_normal((model.node_count, 3))
+    step[model.layout.edge] = 0.2 * size * rng.standard_normal(model.rods.edge_count)
     evaluator.move(start, step, np.zeros((0, 6)), shape)
     return evaluator, shape
 
@@ -154,6 +156,14 @@ def test_rigid_motion_leaves_the_energy_of_an_anisotropic_strip_unchanged():
     moved.length[:] = shape.length
     assert before != 0.0
     assert evaluator.evaluate(moved, ("flattening",))["flattening"] == pytest.approx(before, rel=1e-10)
+
+
+def test_viscosity_has_all_of_the_stiffness_of_a_narrow_strip_with_fibres():
+    evaluator, shape = bent_strip(lambda model: anisotropic(model, coupling=0.5), 1e-4, length=2e-3)
+    names = ("stretching", "bending", "twisting", "flattening")
+    found = evaluator.evaluate(shape, (*names, "viscosity"))
+    assert abs(found["flattening"]) > 1e-4 * found["bending"]
+    assert found["viscosity"] == pytest.approx(0.5 * sum(found[name] for name in names), rel=1e-5)
 
 
 def section_energy(x, offset, degree=30):
