@@ -66,11 +66,11 @@ evidence: $(TESTS)  ## Compute all cases with a known answer, about 20 minutes; 
 	$(BIN)/bilayer validate --out runs/validation
 
 # The commands are those of the page.
-gallery: $(STAMP)  ## Draw the pictures of docs/gallery.md anew.
+gallery: $(STAMP)  ## Draw the pictures and films of docs/gallery.md anew.
 	mkdir -p runs/gallery
 	sed -n 's/^bilayer \(run\|render\) .*/& --force/p' docs/gallery.md > runs/gallery/commands.sh
 	cd runs/gallery && PATH="$(CURDIR)/$(BIN):$$PATH" sh -e commands.sh
-	cp runs/gallery/*.png docs/images/gallery/
+	cp runs/gallery/*.png runs/gallery/*.webp docs/images/gallery/
 
 clean:  ## Remove .venv and what runs and tests left.
 	rm -rf $(VENV) build dist install log runs .pytest_cache .ruff_cache .hypothesis *.egg-info
