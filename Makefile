@@ -66,11 +66,11 @@ evidence: $(TESTS)  ## Compute all cases with a known answer, about 20 minutes; 
 	$(BIN)/bilayer validate --out runs/validation
 
 # The commands are those of the page.
-gallery: $(STAMP)  ## Draw the pictures of docs/gallery.md anew.
+gallery: $(STAMP)  ## Draw the pictures and films of docs/gallery.md anew.
 	mkdir -p runs/gallery
 	sed -n 's/^bilayer \(run\|render\) .*/& --force/p' docs/gallery.md > runs/gallery/commands.sh
 	cd runs/gallery && PATH="$(CURDIR)/$(BIN):$$PATH" sh -e commands.sh
-	cp runs/gallery/*.png docs/images/gallery/
+	cp runs/gallery/*.png runs/gallery/*.webp docs/images/gallery/
 
 clean:  ## Remove .venv and what runs and tests left.
 	rm -rf $(VENV) build dist install log runs .pytest_cache .ruff_cache .hypothesis *.egg-info
@@ -100,8 +100,8 @@ wheel: $(STAMP)  ## Compile the engine into a wheel for this platform, which lea
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m auditwheel repair --wheel-dir dist build/wheel/*.whl
 
 # What the system must supply: Python's module venv, and Mesa's software drivers, which need no graphics card: of OpenGL for
-# pictures and films (`bilayer render`), of Vulkan for those of the viewer (`bilayer view --screenshot`). `make test` needs
-# the browser Chromium as well, for the site and `bilayer view --web`: the package of Debian, or where there is none that of Playwright.
+# pictures and films (`bilayer render`), of Vulkan for those of the viewer (`bilayer view --screenshot`). `make verify` and
+# CI need the browser Chromium as well, for `bilayer view --web` and the site: the package of Debian, or where there is none that of Playwright.
 # Debian and Ubuntu packages are installed where this command may, else the line to paste is printed.
 system:
 	@command -v $(PYTHON) >/dev/null || { \
@@ -118,7 +118,7 @@ system:
 	PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p | grep -q libEGL.so.1 && \
 	    PATH="$$PATH:/sbin:/usr/sbin" ldconfig -p | grep -q libEGL_ || \
 	    missing="$$missing libegl1 libegl-mesa0 libgl1-mesa-dri"; \
-	$(if $(filter test verify,$(MAKECMDGOALS)),! grep -qx ID=debian /etc/os-release || command -v chromium >/dev/null || missing="$$missing chromium";) \
+	$(if $(CI)$(filter verify,$(MAKECMDGOALS)),! grep -qx ID=debian /etc/os-release || command -v chromium >/dev/null || missing="$$missing chromium";) \
 	test -n "$$missing" || exit 0; \
 	if test "$$(id -u)" = 0; then sudo=; elif sudo -n true 2>/dev/null; then sudo=sudo; else sudo=no; fi; \
 	if test "$$sudo" != no && command -v apt-get >/dev/null; then \

@@ -36,7 +36,9 @@ for name, text in {
     "replay_node.md": parameters(REPLAY_NODE),
     "validation.md": VALIDATED.read_text(encoding="utf-8") if VALIDATED.exists() else NOT_VALIDATED,
 }.items():
-    (MADE / name).write_text(text, encoding="utf-8")
+    path = MADE / name
+    if not path.exists() or path.read_text(encoding="utf-8") != text:  # else Sphinx would read its page again
+        path.write_text(text, encoding="utf-8")
 
 project = "bilayer_sim_ros"
 author = "the authors of bilayer_sim_ros"
@@ -44,7 +46,6 @@ version = release = bilayer_core.__version__
 extensions = ["myst_nb", "numpydoc", "sphinx.ext.autodoc", "sphinx.ext.autosummary"]
 myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 4
-nb_execution_mode = "cache"
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
 html_theme = "pydata_sphinx_theme"

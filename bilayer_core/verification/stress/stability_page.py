@@ -19,13 +19,13 @@ LEAST_ACCURATE, MOST_REFUSED, LEAST_REMEDIES = 0.70, 0.05, 0.90
 
 PROMISES = (
     ("positions, velocities", "numbers, at every accepted step"),
-    ("gaps", "above zero at every accepted step, and nothing passes through anything in one, by a check of its own"),
+    ("gaps", "above zero at every accepted step; nothing passes through anything within one, by an independent check"),
     ("energy without driving", f"T + V rises by less than {MOST_GAIN:g} of the largest energy of the run"),
     ("energy with driving", f"T + V less the work supplied rises by at most {MOST_MADE:g} of the largest"),
     ("energy budget", f"closes to {100 * LARGEST_RESIDUAL:g} % of its largest row inside the region"),
-    ("momentum", "of what flies freely changes as gravity has it, to √n of Newton's tolerance in n steps"),
+    ("momentum", "of a free flight changes by gravity alone, to √n of Newton's tolerance in n steps"),
     ("effort", f"at most {MOST_ITERATIONS} Newton iterations an attempt, {MOST_REJECTED} attempts a step, on average"),
-    ("refusals", "say what, when, how close and what to change"),
+    ("refusals", "name the cause, the time, the distance to the limit and the remedy"),
 )
 
 
