@@ -55,24 +55,27 @@ def _slope(strands, system, at, e):
 @kernel
 def most_of_turn(rails, strands, system, at):
     """Return the largest part of a step over which the bounds of turning hold."""
-    steepest = 0.0
+    steepest, last = 0.0, -1
     for i in range(rails.node_edges.shape[0]):
         if has_arm(rails, i):
             for side in range(2):
-                steepest = max(steepest, _slope(strands, system, at, rails.node_edges[i, side]))
+                e = rails.node_edges[i, side]
+                if e != last:  # which the node before has looked at
+                    steepest, last = max(steepest, _slope(strands, system, at, e)), e
     return LARGEST_SLOPE / steepest if steepest > LARGEST_SLOPE else 1.0
 
 
 @kernel
 def write_swings(rails, strands, system, at, part):
     """Write the swing of each rail in a part of a step [m]; return the largest."""
-    largest, nodes = 0.0, rails.node_edges.shape[0]
+    largest, nodes, last, slope = 0.0, rails.node_edges.shape[0], -1, 0.0
     for r in range(nodes):
         turn = 0.0
         if has_arm(rails, r):
             for side in range(2):
                 e = rails.node_edges[rails.node[r], side]
-                slope = _slope(strands, system, at, e)
+                if e != last:  # whose slope is that at the node before
+                    slope, last = _slope(strands, system, at, e), e
                 turn = max(turn, 1.3 * slope / (1.0 - part * slope) + abs(system.angle_step[e]))
         rails.swing[r] = math.sqrt(rails.arm[r, 0] ** 2 + rails.arm[r, 1] ** 2) * turn
         largest = max(largest, rails.swing[r])

@@ -13,6 +13,14 @@ from __future__ import annotations
 import math
 
 from bilayer_core.jit import kernel
+from bilayer_core.jit.called import flat, stack_matrix
+
+BLOCK = 64
+"""Edges whose directors are carried to scratch before they are written: what is read and what is written cannot overlap
+then, so the compiler computes several edges at once.
+"""
+SMALL_TURN = 0.05
+"""Angle up to which five terms of the series of cosine and sine are exact to rounding [rad]: the next is 1e-22."""
 
 
 @kernel
@@ -81,15 +89,47 @@ def transport_directors(count, tangent, director1, director2, angle, new_tangent
     director1_out, director2_out : Array
         Written, shape (≥ count, 3).
     """
+    turn, carried = stack_matrix(2, BLOCK), stack_matrix(6, BLOCK)
+    for first in range(0, count, BLOCK):
+        last = min(first + BLOCK, count)
+        _turns(angle[first:last], turn)
+        a, b = flat(tangent[first:last]), flat(new_tangent[first:last])
+        u, v = flat(director1[first:last]), flat(director2[first:last])
+        _transport(last - first, a, b, u, v, turn, carried)
+        for k in range(last - first):
+            for c in range(3):
+                director1_out[first + k, c], director2_out[first + k, c] = carried[c, k], carried[3 + c, k]
+
+
+@kernel
+def _turns(angle, turn_out):
+    """Write cosines and sines of angles, by their series where all are small."""
+    total = 0.0
+    for k in range(angle.shape[0]):
+        total += angle[k] * angle[k]
+    if total < SMALL_TURN * SMALL_TURN:
+        for k in range(angle.shape[0]):
+            x = angle[k]
+            y = x * x
+            turn_out[0, k] = 1.0 - y * (0.5 - y * (1.0 / 24.0 - y * (1.0 / 720.0 - y / 40320.0)))
+            turn_out[1, k] = x - x * y * (1.0 / 6.0 - y * (1.0 / 120.0 - y * (1.0 / 5040.0 - y / 362880.0)))
+        return
+    for k in range(angle.shape[0]):
+        turn_out[0, k], turn_out[1, k] = math.cos(angle[k]), math.sin(angle[k])
+
+
+@kernel
+def _transport(count, a, b, u, v, turn, carried_out):
+    """Write the directors of a block of edges, by components."""
     for k in range(count):
-        a0, a1, a2 = tangent[k, 0], tangent[k, 1], tangent[k, 2]
-        b0, b1, b2 = new_tangent[k, 0], new_tangent[k, 1], new_tangent[k, 2]
-        u0, u1, u2 = director1[k, 0], director1[k, 1], director1[k, 2]
-        v0, v1, v2 = director2[k, 0], director2[k, 1], director2[k, 2]
+        a0, a1, a2 = a[3 * k], a[3 * k + 1], a[3 * k + 2]
+        b0, b1, b2 = b[3 * k], b[3 * k + 1], b[3 * k + 2]
+        u0, u1, u2 = u[3 * k], u[3 * k + 1], u[3 * k + 2]
+        v0, v1, v2 = v[3 * k], v[3 * k + 1], v[3 * k + 2]
         inverse = 1.0 / (1.0 + a0 * b0 + a1 * b1 + a2 * b2)
         su = (u0 * b0 + u1 * b1 + u2 * b2) * inverse
         sv = (v0 * b0 + v1 * b1 + v2 * b2) * inverse
-        c, s = math.cos(angle[k]), math.sin(angle[k])
+        c, s = turn[0, k], turn[1, k]
         scale = c * su + s * sv
         p0 = c * u0 + s * v0 - scale * (a0 + b0)
         p1 = c * u1 + s * v1 - scale * (a1 + b1)
@@ -102,9 +142,9 @@ def transport_directors(count, tangent, director1, director2, angle, new_tangent
         p0 *= norm
         p1 *= norm
         p2 *= norm
-        director1_out[k, 0] = p0
-        director1_out[k, 1] = p1
-        director1_out[k, 2] = p2
-        director2_out[k, 0] = b1 * p2 - b2 * p1
-        director2_out[k, 1] = b2 * p0 - b0 * p2
-        director2_out[k, 2] = b0 * p1 - b1 * p0
+        carried_out[0, k] = p0
+        carried_out[1, k] = p1
+        carried_out[2, k] = p2
+        carried_out[3, k] = b1 * p2 - b2 * p1
+        carried_out[4, k] = b2 * p0 - b0 * p2
+        carried_out[5, k] = b0 * p1 - b1 * p0

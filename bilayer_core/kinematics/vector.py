@@ -9,6 +9,9 @@ from bilayer_core.jit import kernel
 SMALL_ANGLE = 0.05
 """Tangent up to which six terms of the series of the inverse tangent are exact to rounding."""
 
+POSITIVE = 2**31 - 1
+"""Mask that leaves places in arrays as they are, and tells the compiler that none counts from the end."""
+
 
 @kernel
 def row(array, k):

@@ -9,7 +9,7 @@ from bilayer_core.model.force_slots import NAMES
 from bilayer_core.model.model import Model
 
 ROWS_OF_BLOCK = 64
-"""Of a border with many columns, see `engine.linear.wide_border`."""
+"""Of a border, see `engine.linear.border`."""
 
 
 def sizes_of(model: Model) -> dict[str, int]:

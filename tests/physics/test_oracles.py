@@ -11,8 +11,8 @@ from support.sample_scenes import layer, rod, scene
 from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hessian
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
 from bilayer_core.engine.evaluator import Evaluator
-from bilayer_core.engine.linear.band import backward_band, eliminate_band, factor_band, forward_band, width
-from bilayer_core.engine.linear.wide_border import column_times, eliminate_wide, subtract_column
+from bilayer_core.engine.linear.band import backward_band, factor_band, forward_band, width
+from bilayer_core.engine.linear.border import column_times, eliminate_border, subtract_column
 from bilayer_core.kinematics.frames import transport_directors
 from bilayer_core.kinematics.rotation import matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
 from bilayer_core.kinematics.vector import angle
@@ -113,12 +113,18 @@ def test_band_solver_agrees_with_a_dense_one(half_bandwidth):
     right[:25] = 0.0  # where columns of a border begin
     expected = np.linalg.solve(dense, right[:n])
     columns, scaled, corner = right.T.copy(), np.ones((6, n + b)), np.eye(6)
-    eliminate_band(band, n, b, 6, columns, scaled, corner, np.zeros(n + 1, dtype=np.int64))
+    filled = blocks_with_values(columns)
+    eliminate_border(band, n, b, 6, columns, scaled, corner, np.zeros(6, dtype=np.int64), filled)
     assert corner == pytest.approx(np.eye(6) - right[:n].T @ expected, rel=1e-10, abs=1e-12)
     assert scaled[:, :n] == pytest.approx(columns[:, :n] / band[:n, 0], rel=1e-10, abs=1e-12)
     backward_band(band, n, width(b), columns[2])
     assert columns[2, :n] == pytest.approx(expected[:, 2], rel=1e-10, abs=1e-12)
     assert factor_band(indefinite, n, b, False) == 41
+
+
+def blocks_with_values(columns):
+    """Return in which blocks of rows columns have values, shape (column, block)."""
+    return np.add.reduceat(columns != 0.0, np.arange(0, columns.shape[1], ROWS_OF_BLOCK), axis=1) > 0
 
 
 @pytest.mark.parametrize("gap", [0, 1, 7, 8, 9, 30, 56, 70])
@@ -141,18 +147,16 @@ def test_a_border_whose_columns_have_gaps_is_eliminated_like_a_dense_one(gap):
             columns[a, block[a % strand]] = rng.standard_normal()
     right, corner = columns[:, :n].copy(), np.eye(m)
     assert factor_band(band, n, b, False) == -1
-    same, wide_corner, scaled = columns.copy(), corner.copy(), np.ones((2, m, n + b))
-    eliminate_band(band, n, b, m, columns, scaled[0], corner, np.zeros(n + 1, dtype=np.int64))
+    scaled, filled = np.ones((m, n + b)), blocks_with_values(columns)
+    eliminate_border(band, n, b, m, columns, scaled, corner, np.zeros(m, dtype=np.int64), filled)
     expected = np.eye(m) - right @ np.linalg.solve(dense, right.T)
     assert corner == pytest.approx(expected, rel=1e-12, abs=1e-14)
-    filled = np.add.reduceat(same != 0.0, np.arange(0, n + b, ROWS_OF_BLOCK), axis=1) > 0
-    eliminate_wide(band, n, b, m, same, scaled[1], wide_corner, np.zeros(n + 1, dtype=np.int64), filled)
-    assert wide_corner == pytest.approx(expected, rel=1e-12, abs=1e-14)
     vector = rng.standard_normal(n)
     for a in range(m):
-        assert column_times(scaled[1], filled, a, n, vector) == pytest.approx(scaled[0, a, :n] @ vector, abs=1e-14)
+        expected = columns[a, :n] / band[:n, 0] @ vector
+        assert column_times(scaled, filled, a, n, vector) == pytest.approx(expected, abs=1e-14)
         left = vector.copy()
-        subtract_column(same, filled, a, n, 0.5, left)
+        subtract_column(columns, filled, a, n, 0.5, left)
         assert left == pytest.approx(vector - 0.5 * columns[a, :n], abs=1e-14)
 
 

@@ -8,7 +8,8 @@ factors −1, +1 and ±½ or ±1. This is the only file that joins second deriva
 from __future__ import annotations
 
 from bilayer_core.jit import kernel, piece
-from bilayer_core.jit.called import stack_matrix
+from bilayer_core.jit.called import flat, stack_matrix
+from bilayer_core.kinematics.vector import POSITIVE
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 
@@ -53,7 +54,7 @@ def _add_nodes(strands, sums, factor, band):
     """Add factor × mass, and the blocks of single nodes (contact, drag) by their upper triangles."""
     hessian = sums.node_hessian
     for i in range(strands.row.shape[0]):
-        d = strands.row[i]
+        d = strands.row[i] & POSITIVE
         for m in range(3):
             band[d + m, 0] += factor * strands.node_mass[i]
             if hessian.shape[0] > 0:
@@ -62,47 +63,62 @@ def _add_nodes(strands, sums, factor, band):
 
 
 @kernel
+def _place(reach, row, column):
+    """Return where A[row, column] is in a flat band of half-bandwidth `reach`; A[row, column + 1] is next."""
+    return (row * reach + column) & POSITIVE
+
+
+@kernel
 def _add_edges(strands, sums, factor, band):
     """Add the blocks of edges, by their upper triangles, and factor × moment of inertia."""
-    hessian = sums.edge_hessian
+    hessian, matrix, reach = flat(sums.edge_hessian), flat(band), band.shape[1] - 1
     for k in range(strands.edge_node.shape[0]):
-        i, t = strands.edge_node[k], strands.edge_unknown[k]
+        i, t, h = strands.edge_node[k] & POSITIVE, strands.edge_unknown[k], 16 * k
         d0, d1 = strands.row[i], strands.row[i + 1]
+        turned = _place(reach, t, d1)
         for m in range(3):
+            own, other = _place(reach, d0 + m, d0), _place(reach, d1 + m, d1)
+            between, by_angle = _place(reach, d0 + m, d1), _place(reach, d0 + m, t)
+            for n in range(m, 3):
+                matrix[own + n] += hessian[h + 4 * m + n]
+                matrix[other + n] += hessian[h + 4 * m + n]
             for n in range(3):
-                value = hessian[k, m, n] if m <= n else hessian[k, n, m]
-                if m <= n:
-                    band[d0 + m, n - m] += value
-                    band[d1 + m, n - m] += value
-                band[d0 + n, d1 + m - d0 - n] -= value
-            band[d0 + m, t - d0 - m] -= hessian[k, m, 3]
-            band[t, d1 + m - t] += hessian[k, m, 3]
-        band[t, 0] += hessian[k, 3, 3] + factor * strands.spin_inertia[k]
+                matrix[between + n] -= hessian[h + 4 * min(m, n) + max(m, n)]
+            matrix[by_angle] -= hessian[h + 4 * m + 3]
+            matrix[turned + m] += hessian[h + 4 * m + 3]
+        matrix[_place(reach, t, t)] += hessian[h + 15] + factor * strands.spin_inertia[k]
 
 
 @kernel
 def _add_bends(strands, hessian, band):
-    """Add cross blocks of bending elements, of rows (e_a, θ_a) and columns (e_b, θ_b); those of clamps have none."""
+    """Add cross blocks of bending elements, of rows (e_a, θ_a) and columns (e_b, θ_b); those of clamps have none.
+
+    Unknowns of a strand follow each other: nodes 0 and 1 with the angles of edges a and b behind them, and node 2.
+    """
+    cross, matrix, reach = flat(hessian), flat(band), band.shape[1] - 1
     for k in range(strands.bend_count):
-        a, b = strands.joint_a[k], strands.joint_b[k]
+        a, b, h = strands.joint_a[k] & POSITIVE, strands.joint_b[k] & POSITIVE, 16 * k
         if a >= strands.edge_count or b >= strands.edge_count:
             continue
-        i = strands.edge_node[a]
+        i = strands.edge_node[a] & POSITIVE
         d0, d1, d2 = strands.row[i], strands.row[i + 1], strands.row[i + 2]
         ta, tb = strands.edge_unknown[a], strands.edge_unknown[b]
+        turned1, turned2 = _place(reach, ta, d1), _place(reach, ta, d2)
         for m in range(3):
+            first, second, third = _place(reach, d0 + m, d1), _place(reach, d0 + m, d2), _place(reach, d1 + m, d2)
+            own = _place(reach, d1 + m, d1)
             for n in range(3):
-                value = hessian[k, m, n]
-                band[d0 + m, d1 + n - d0 - m] += value
-                band[d0 + m, d2 + n - d0 - m] -= value
-                band[d1 + m, d2 + n - d1 - m] += value
+                value = cross[h + 4 * m + n]
+                matrix[first + n] += value
+                matrix[second + n] -= value
+                matrix[third + n] += value
                 if n >= m:
-                    band[d1 + m, n - m] -= value + hessian[k, n, m]
-            add(band, tb, d0 + m, -hessian[k, m, 3])
-            add(band, tb, d1 + m, hessian[k, m, 3])
-            add(band, ta, d1 + m, -hessian[k, 3, m])
-            add(band, ta, d2 + m, hessian[k, 3, m])
-        add(band, tb, ta, hessian[k, 3, 3])
+                    matrix[own + n] -= value + cross[h + 4 * n + m]
+            matrix[_place(reach, d0 + m, tb)] -= cross[h + 4 * m + 3]
+            matrix[_place(reach, d1 + m, tb)] += cross[h + 4 * m + 3]
+            matrix[turned1 + m] -= cross[h + 12 + m]
+            matrix[turned2 + m] += cross[h + 12 + m]
+        matrix[_place(reach, ta, tb)] += cross[h + 15]
 
 
 @kernel

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from bilayer_core.engine.linear.arms import stencil_jacobian, stencil_rows
 from bilayer_core.engine.linear.attachments import condense_clamp_edges, condense_clamp_edges_in_plane, condense_nodes
+from bilayer_core.engine.linear.border import column_times, subtract_column
 from bilayer_core.engine.linear.contact_columns import condense_contacts_to_bodies
 from bilayer_core.engine.linear.dense import count_negative_dense, factor_dense, solve_dense
-from bilayer_core.engine.linear.wide_border import column_times, is_wide, subtract_column
+from bilayer_core.engine.linear.new_columns import add_to_column, clear_column
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.called import stack_matrix
 from bilayer_core.kinematics.copying import copy
@@ -59,23 +60,31 @@ def _add_links(surfaces, strands, sums, border):
                         border[rows[m], column + n] += jacobian[c, m] * sums.link_hessian[k, c, n]
 
 
+@kernel
+def _any(values):
+    """Return whether any of the values is not zero."""
+    total = 0.0
+    for i in range(values.shape[0]):
+        total += abs(values[i])
+    return total != 0.0
+
+
 @piece(int, Problem, float)
 def restrict_bodies(p, shift):
     """Return D and U restricted to what bodies may do, shifted by multiples of their masses."""
     freedom, inertia, constrained, dimension = p.bodies.freedom, p.bodies.inertia, p.constrained, p.strands.dimension
-    schur, corner, rows, columns = p.bordered.schur, p.border.corner, p.border.border, p.bordered.border
-    m, n = freedom.shape
+    schur, corner, rows = p.bordered.schur, p.border.corner, p.border.border
+    (m, n), firsts = freedom.shape, p.bodies.freedom_first
     for a in range(n):
-        first = p.bodies.freedom_first[a]
         for b in range(n):
-            other, total = p.bodies.freedom_first[b], 0.0
-            for i in range(first, first + 6):
-                if freedom[i, a] == 0.0:
-                    continue
-                total += shift * inertia[i] * freedom[i, a] * freedom[i, b]
-                for j in range(other, other + 6):
-                    total += freedom[i, a] * corner[i, j] * freedom[j, b]
-            schur[a, b] = total
+            schur[a, b] = 0.0
+        for i in range(firsts[a], firsts[a] + 6):
+            if freedom[i, a] != 0.0:
+                for b in range(n):
+                    total = shift * inertia[i] * freedom[i, b]
+                    for j in range(firsts[b], firsts[b] + 6):
+                        total += corner[i, j] * freedom[j, b]
+                    schur[a, b] += freedom[i, a] * total
     if p.bordered.coupled[0] == 0:
         return READY
     for k in range(constrained.row.shape[0]):
@@ -83,19 +92,20 @@ def restrict_bodies(p, shift):
             for i in range(m):
                 rows[row, i] = 0.0
     for a in range(n):
-        for row in range(columns.shape[1]):
-            columns[a, row] = 0.0
-    for row in range(p.strands.size):  # in few of which a body has values that are not zero
-        before, present = -1, 0.0
+        clear_column(p.bordered, a)
+    for row in range(p.strands.size):
+        if not _any(rows[row]):  # most have none
+            continue
+        before, present = -1, False
         for a in range(n):
-            first = p.bodies.freedom_first[a]
+            first = firsts[a]
             if first != before:
-                before, present = first, 0.0
+                before, present = first, _any(rows[row, first : first + 6])
+            if present:
+                value = 0.0
                 for i in range(first, first + 6):
-                    present += abs(rows[row, i])
-            if present != 0.0:
-                for i in range(first, first + 6):
-                    columns[a, row] += freedom[i, a] * rows[row, i]
+                    value += freedom[i, a] * rows[row, i]
+                add_to_column(p.bordered, a, row, value)
     return READY
 
 
@@ -128,25 +138,13 @@ def solve_bordered(p):
         for f in range(free):
             for c in range(6):
                 load[a] -= freedom[6 * f + c, a] * p.sums.body[f, c]
-    wide = is_wide(width, size)
     if bordered.coupled[0] == 1:
         for a in range(width):
-            if wide:
-                load[a] -= column_times(scaled, bordered.filled, a, size, right)
-                continue
-            total = 0.0
-            for j in range(size):
-                total += scaled[a, j] * right[j]
-            load[a] -= total
+            load[a] -= column_times(scaled, bordered.filled, a, size, right)
     solve_dense(bordered.schur, width, bordered.begins, load)
     if bordered.coupled[0] == 1:
         for a in range(width):
-            part = load[a]
-            if wide:
-                subtract_column(columns, bordered.filled, a, size, part, right)
-                continue
-            for j in range(size):
-                right[j] -= columns[a, j] * part
+            subtract_column(columns, bordered.filled, a, size, load[a], right)
     for f in range(free):
         for c in range(6):
             body_step[f, c] = 0.0

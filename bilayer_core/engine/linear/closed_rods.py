@@ -17,7 +17,7 @@ once: a contact couples them with the node and the edge before the join, at the 
 from __future__ import annotations
 
 from bilayer_core.engine.linear.assembly import hold_unknowns
-from bilayer_core.engine.linear.new_columns import add_columns
+from bilayer_core.engine.linear.new_columns import add_columns, add_to_column
 from bilayer_core.jit import kernel, piece
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
@@ -28,7 +28,7 @@ def move_joins_to_border(p):
     """Move what is in the band twice to columns of the border, after those of bodies, and add the two up."""
     joins, bordered, band, strands = p.joins, p.bordered, p.system.band, p.strands
     count, base, bandwidth = joins.first.shape[0], bordered.width[0], strands.bandwidth
-    add_columns(bordered, count, False)
+    add_columns(bordered, count)
     for k in range(count):
         _move_row(joins.column, bordered, band, strands.size, bandwidth, base, k, joins.first[k])
         if joins.copy[k] != joins.first[k]:
@@ -50,8 +50,8 @@ def _move_row(column, bordered, band, size, bandwidth, base, k, row):
         value = band[row, i - row] if i >= row else band[i, row - i]
         if column[i] >= 0:
             corner[base + column[i], own] += value
-        else:
-            border[own, i] += value
+        elif value != 0.0:
+            add_to_column(bordered, own, i, value)
 
 
 @kernel

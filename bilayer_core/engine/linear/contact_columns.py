@@ -447,7 +447,7 @@ def move_to_border(p):
     if base + count > bordered.load.shape[0]:
         bordered.width[0] = base + count
         return False
-    add_columns(bordered, count, True)
+    add_columns(bordered, count)
     _move_from_band(columns, bordered, strands, base, p.system.band)
     _add_between(columns, p.joins, p.bodies.freedom, bordered, base)
     if p.joins.exists:

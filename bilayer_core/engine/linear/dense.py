@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 
-from bilayer_core.engine.linear.wide_border import MANY
 from bilayer_core.jit import kernel
 
 
@@ -18,15 +17,15 @@ def factor_dense(matrix, n, begins_out):
     definite.
 
     Four rows are made together, so that those before are read a quarter as often: of a few hundred rows they would not
-    stay in the nearest cache. Where there are many, zeros at the beginnings of rows, which stay zero, are left out;
-    their numbers are left in `begins_out`.
+    stay in the nearest cache. Zeros at the beginnings of rows, which stay zero, are left out; their numbers are left in
+    `begins_out`.
     """
     for first in range(0, n, 4):
         last = min(first + 4, n)
         begin = 0
         for i in range(first, last):
             begins_out[i] = 0
-            while n >= MANY and begins_out[i] < i and matrix[i, begins_out[i]] == 0.0:
+            while begins_out[i] < i and matrix[i, begins_out[i]] == 0.0:
                 begins_out[i] += 1
         if last == first + 4:
             begin = first

@@ -1,4 +1,4 @@
-"""New columns of the border, after those that are there."""
+"""New columns of the border, after those that are there, and in which blocks of rows each has values."""
 
 from __future__ import annotations
 
@@ -7,22 +7,24 @@ from bilayer_core.model.sizes import ROWS_OF_BLOCK
 
 
 @kernel
-def add_columns(bordered, count, noted):
-    """Add columns of zeros to the border, and to the corner; there must be capacity for them.
+def clear_column(bordered, a):
+    """Clear a column, which has values in the blocks alone that are noted."""
+    border, filled = bordered.border, bordered.filled
+    for k in range(filled.shape[1]):
+        if filled[a, k]:
+            for i in range(k * ROWS_OF_BLOCK, min((k + 1) * ROWS_OF_BLOCK, border.shape[1])):
+                border[a, i] = 0.0
+            filled[a, k] = False
 
-    If it is `noted` in which blocks of rows these get values, it is by `add_to_column`; of all others they may be
-    anywhere.
-    """
-    base, border, filled = bordered.width[0], bordered.border, bordered.filled
+
+@kernel
+def add_columns(bordered, count):
+    """Add columns of zeros to the border, and to the corner; there must be capacity for them."""
+    base = bordered.width[0]
     bordered.width[0] = base + count
-    cleared = base if bordered.coupled[0] == 1 else 0
+    for a in range(base if bordered.coupled[0] == 1 else 0, bordered.width[0]):
+        clear_column(bordered, a)
     bordered.coupled[0] = 1
-    for a in range(bordered.width[0]):
-        for k in range(filled.shape[1]):
-            if a >= cleared and (a >= bordered.noted[0] or filled[a, k]):
-                for i in range(k * ROWS_OF_BLOCK, min((k + 1) * ROWS_OF_BLOCK, border.shape[1])):
-                    border[a, i] = 0.0
-            filled[a, k] = a < base or not noted
     for a in range(bordered.width[0]):
         for b in range(base if a < base else 0, bordered.width[0]):
             bordered.schur[a, b] = 0.0

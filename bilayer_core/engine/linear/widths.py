@@ -6,8 +6,8 @@ registers: for 200 nodes in space two to three times as fast as one set for all 
 
 from __future__ import annotations
 
-from bilayer_core.engine.linear.band import backward_band, eliminate_band, factor_band, forward_band, width
-from bilayer_core.engine.linear.wide_border import eliminate_wide, is_wide
+from bilayer_core.engine.linear.band import backward_band, factor_band, forward_band, width
+from bilayer_core.engine.linear.border import eliminate_border
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.piece import Piece
 from bilayer_core.jit.record import Matrix, Vector
@@ -18,18 +18,6 @@ from bilayer_core.model.records.status import READY
 def _declare(function, suffix: str, *arguments) -> Piece:
     function.__name__ = f"{function.__name__}_{suffix}"
     return piece(int, *arguments)(function)
-
-
-@kernel
-def _eliminate(band, n, half_bandwidth, bordered):
-    columns, scaled, corner, present = bordered.border, bordered.scaled, bordered.schur, bordered.present
-    m = bordered.width[0]
-    if is_wide(m, n):
-        eliminate_wide(band, n, half_bandwidth, m, columns, scaled, corner, present, bordered.filled)
-        bordered.noted[0] = max(bordered.noted[0], m)
-    else:
-        bordered.noted[0] = 0
-        eliminate_band(band, n, half_bandwidth, m, columns, scaled, corner, present)
 
 
 def _of_width(half_bandwidth: int) -> tuple[Piece, ...]:
@@ -48,7 +36,8 @@ def _of_width(half_bandwidth: int) -> tuple[Piece, ...]:
         return READY
 
     def eliminate(band, n, bordered):
-        _eliminate(band, n, half_bandwidth, bordered)
+        of = bordered
+        eliminate_border(band, n, half_bandwidth, of.width[0], of.border, of.scaled, of.schur, of.present, of.filled)
         return READY
 
     return _set(factor, forward, backward, eliminate, str(half_bandwidth))
@@ -132,7 +121,7 @@ def go_backward(band, n, b, right):
 
 @kernel
 def eliminate(band, n, b, bordered):
-    """Eliminate the band from the border, as `band.eliminate_band`."""
+    """Eliminate the band from the border, as `border.eliminate_border`."""
     if b == 5:
         return eliminate_5(band, n, bordered)
     if b == 7:

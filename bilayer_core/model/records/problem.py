@@ -105,12 +105,8 @@ class BorderedSystem:
     schur: Matrix = ("column", "column")
     begins: Indices = ("column",)  # of rows of its factor: column of the first value that is not zero
     load: Vector = ("column",)
-    present: Indices = ("row",)  # scratch: from and to which row a column is not zero
-    filled: FlagTable = (
-        "column",
-        "block of rows",
-    )  # whether it has values there, see `engine.linear.wide_border`
-    noted: Indices = (1,)  # of how many columns that is known
+    present: Indices = ("column",)  # scratch: columns with values in a block of rows
+    filled: FlagTable = ("column", "block of rows")  # whether a column has values there, see `engine.linear.border`
     width: Indices  # columns in use, shape (1,)
     coupled: Indices = (1,)  # whether the border is not zero
 

@@ -1,9 +1,8 @@
-"""Borders of many columns, as where ribbons lie on each other: each has values in the rows of a few strands alone.
+"""The border of the band matrix: each column has values in the rows of a few strands alone.
 
 Rows are gone through in blocks. It is noted in which of these a column has values (`engine.linear.new_columns`), and no
 others are read or written: memory is what a border of a thousand rows and some hundred columns takes long for. So the
-Schur complement costs the sum over blocks of the squares of the columns that have values there. `engine.linear.band` is
-faster for few columns.
+Schur complement costs the sum over blocks of the squares of the columns that have values there.
 """
 
 from __future__ import annotations
@@ -11,30 +10,36 @@ from __future__ import annotations
 from bilayer_core.jit import kernel
 from bilayer_core.model.sizes import ROWS_OF_BLOCK
 
-MANY = 192
-"""Columns from which on this is faster."""
 AT_ONCE = 16
 """Columns that are eliminated together: one waits for what the row before has left in it, several do not."""
 
 
 @kernel
-def is_wide(columns, rows):
-    """Return whether a border is one of many columns."""
-    return MANY <= columns <= rows
+def eliminate_border(band, n, b, m, border, scaled_out, corner, present, filled):
+    """Eliminate the factorised band A = L D Lᵀ from a matrix with m more columns and rows,
 
-
-@kernel
-def eliminate_wide(band, n, b, m, border, scaled_out, corner, present, filled):
-    """Eliminate a band as `band.eliminate_band` does.
+        [ A   U ]
+        [ Uᵀ  C ]
 
     Parameters
     ----------
+    b, m : int
+        Half-bandwidth of A, and number of columns.
+    border : Array
+        U by columns, shape (≥ m, n + b), zeros at the end; overwritten with L⁻¹ U.
     scaled_out : Array
-        As there, in blocks with values alone.
+        Written in blocks with values alone: D⁻¹ L⁻¹ U, shape (≥ m, n + b).
+    corner : Array
+        C, shape (≥ m, ≥ m); overwritten with the Schur complement C − Uᵀ A⁻¹ U.
     present : Array
         Scratch, shape (≥ m,).
     filled : Array
         In which blocks of rows a column has values, brought up to date, shape (≥ m, ≥ number of blocks).
+
+    Notes
+    -----
+    With z = L⁻¹ r, the solution for a right-hand side (r, s) is y = S⁻¹ (s − (D⁻¹ L⁻¹ U)ᵀ z) and
+    x = (D Lᵀ)⁻¹ (z − (L⁻¹ U) y), S being the Schur complement.
     """
     for first in range(0, n, ROWS_OF_BLOCK):
         last, k, count = min(first + ROWS_OF_BLOCK, n), first // ROWS_OF_BLOCK, 0
