@@ -41,7 +41,7 @@ class Size(click.ParamType):
 
 @click.command(cls=Verb)
 @click.argument("file", metavar="FILE.mcap|BAG")
-@click.option("--png", metavar="OUT.png", help="One picture, of the end or of --at.")
+@click.option("--png", metavar="OUT.png", help="One picture, of the end or of all --at.")
 @click.option("--sheet", metavar="OUT.png", help=f"{SHEET_PICTURES} pictures in one, with their times.")
 @click.option("--gif", metavar="OUT.gif|OUT.webp", help=f"An animation, {GIF_RATE:g} pictures a second.")
 @click.option("--mp4", metavar="OUT.mp4", help="A film.")
@@ -107,8 +107,8 @@ def render(
         raise InputError(f"{twice}: is named for two outputs; give each a file of its own")
     if times and frames is not None:
         raise InputError("--frames: says how many pictures, --at of which times; give one of the two")
-    if png and (len(times) > 1 or frames is not None):
-        raise InputError("--png: is one picture; give one --at, or a sheet")
+    if png and frames is not None:
+        raise InputError("--png: is one picture; give --at, or a sheet")
     if len(times) > MOST_PICTURES:
         raise InputError(f"--at: is given {len(times)} times; at most {MOST_PICTURES} are allowed")
     if (sheet or gif) and frames is not None and frames > MOST_PICTURES:
@@ -132,7 +132,7 @@ def render(
     if studio.warning is not None:
         say(f"warning: {studio.warning}", err=True)
     if png:
-        studio.picture(png, times[0] if times else None)
+        studio.picture(png, *times)
         say(f"picture    {png}")
     if sheet:
         studio.sheet(sheet, times or studio.spread(frames or SHEET_PICTURES))

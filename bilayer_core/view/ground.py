@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from bilayer_core.observed.frame import ShapeInfo
+from bilayer_core.view.camera import Shot
 from bilayer_core.view.geometry import plane_axes
 from bilayer_core.view.theme import Theme
 
@@ -54,6 +55,26 @@ class Ground:
         axes, point = plane_axes(plane), np.array(plane.position)
         middle = (self.middle - point) @ axes[:2].T
         return point + (middle + self.radius * np.array(_SIGNS)) @ axes[:2]
+
+
+def is_edge_on(plane: ShapeInfo, shot: Shot) -> bool:
+    """Return whether a picture without perspective shows no more of a plane than a line."""
+    back = shot.eye - shot.target
+    return shot.half_height is not None and abs(plane_axes(plane)[2] @ back) < 1e-9 * np.linalg.norm(back)
+
+
+def below_edge(plane: ShapeInfo, shot: Shot, size: tuple[int, int]) -> list[tuple[float, float]]:
+    """Return the corners of what is below a plane that is seen as a line [pixels], beyond the edges of the picture."""
+    width, height = size
+    back = shot.eye - shot.target
+    right = np.cross(shot.up, back / np.linalg.norm(back))
+    normal, down = plane_axes(plane)[2], np.array([1.0, -1.0])
+    inwards = down * [normal @ right, normal @ shot.up]  # in the picture, whose rows go downwards
+    offset = (np.array(plane.position) - shot.target) @ normal * height / (2.0 * shot.half_height)
+    point = 0.5 * np.array(size) + offset * inwards
+    along, far = np.array([-inwards[1], inwards[0]]), 2.0 * (width + height) + abs(offset)
+    first, last = point - far * along, point + far * along
+    return [tuple(at) for at in (first, last, last - 2.0 * far * inwards, first - 2.0 * far * inwards)]
 
 
 def add_plane(renderer: Any, plane: ShapeInfo, ground: Ground, theme: Theme) -> Any:

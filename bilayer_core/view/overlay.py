@@ -10,10 +10,11 @@ from PIL import Image, ImageDraw, ImageFont
 from bilayer_core.view.colouring import Colouring
 from bilayer_core.view.theme import Theme
 
-TEXT_SHARE, LEAST_TEXT, MOST_TEXT = 1 / 38, 11, 30  # size of text, in heights of the picture, and in pixels
+TEXT_SHARE, LEAST_TEXT = 1 / 38, 11  # size of text: in heights of the picture, and at least [pixels]
 BAR_SHARE, BAR_TEXT = 0.26, 11.0  # width of the colour bar: of the picture's, and at least so many sizes of text
 SCALE_SHARE = 0.16  # width that the scale bar is aimed at, of the picture's
 _STEPS = (1.0, 2.0, 5.0)
+_PREFIXES = ((1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "u"), (1e-9, "n"))
 _LENGTHS = ((1e3, "km"), (1.0, "m"), (1e-3, "mm"), (1e-6, "um"), (1e-9, "nm"))
 
 
@@ -29,9 +30,15 @@ class Overlay:
     metres_per_pixel : float
         Across the line of sight, where the camera looks.
     notes : list of str
-        What arrows and squares mean; those that find room between the bars are written.
+        What arrows and squares mean: written between the bars, or at the upper left where there is no room.
     text_size : int, optional
         In pixels; by default a share of the height.
+
+    Attributes
+    ----------
+    size : tuple of int
+    aside : list of str
+        Notes at the upper left.
     """
 
     def __init__(
@@ -43,14 +50,14 @@ class Overlay:
         notes: list[str],
         text_size: int | None = None,
     ):
-        self._theme = theme
+        self.size, self._theme = size, theme
         self._text = text_size or text_size_of(size[1])
         self._margin = self._text
         self._legend = Image.new("RGBA", size, (*theme.halo, 0))
         drawing = ImageDraw.Draw(self._legend)
         left = self._draw_colour_bar(drawing, colouring)
         right = self._draw_scale_bar(drawing, metres_per_pixel)
-        self._draw_notes(drawing, notes, left, right)
+        self.aside = self._draw_notes(drawing, notes, left, right)
         self._box = self._legend.getbbox()
         self._legend = self._legend.crop(self._box)
 
@@ -60,8 +67,9 @@ class Overlay:
             picture.alpha_composite(self._legend, self._box[:2])
         else:
             picture.paste(self._legend, self._box[:2], self._legend)
-        if time:
-            self._put(ImageDraw.Draw(picture), (self._margin, self._margin), time, "lt")
+        drawing = ImageDraw.Draw(picture)
+        for row, line in enumerate([time] * bool(time) + self.aside):
+            self._put(drawing, (self._margin, self._margin + round(1.4 * row * self._text)), line, "lt")
         return picture
 
     def _put(self, drawing: ImageDraw.ImageDraw, at: tuple[float, float], text: str, anchor: str) -> None:
@@ -99,17 +107,20 @@ class Overlay:
         self._put(drawing, (0.5 * (left + right), bottom + round(0.2 * text)), label, "mt")
         return round(left - 2 * text)
 
-    def _draw_notes(self, drawing: ImageDraw.ImageDraw, notes: list[str], left: int, right: int) -> None:
+    def _draw_notes(self, drawing: ImageDraw.ImageDraw, notes: list[str], left: int, right: int) -> list[str]:
+        """Write what has room between the bars, and return what has none."""
         font = font_of(self._text)
-        lines = [note for note in notes if font.getlength(note) < right - left]
-        for row, note in enumerate(reversed(lines[:3])):
+        if any(font.getlength(note) >= right - left for note in notes):
+            return notes
+        for row, note in enumerate(reversed(notes)):
             at = 0.5 * (left + right), self._legend.size[1] - self._margin - round(1.4 * row * self._text)
             self._put(drawing, at, note, "ms")
+        return []
 
 
 def text_size_of(height: int) -> int:
     """Return the size of text in a picture of a height [pixels]."""
-    return int(min(max(TEXT_SHARE * height, LEAST_TEXT), MOST_TEXT))
+    return int(max(TEXT_SHARE * height, LEAST_TEXT))
 
 
 def round_length(metres: float) -> tuple[float, str]:
@@ -118,6 +129,12 @@ def round_length(metres: float) -> tuple[float, str]:
     length = power * max(step for step in _STEPS if step * power <= metres * (1 + 1e-9))
     scale, unit = next((of for of in _LENGTHS if length >= of[0] * (1 - 1e-9)), _LENGTHS[-1])
     return float(length), f"{length / scale:.6g} {unit}"
+
+
+def with_prefix(value: float, unit: str) -> str:
+    """Return a value with its unit, from 1 to 1000 of it where there is a prefix: ``60 mN``."""
+    scale, prefix = next((of for of in _PREFIXES if value >= of[0] * (1 - 1e-9)), _PREFIXES[-1])
+    return f"{value / scale:.3g} {prefix}{unit}"
 
 
 @cache

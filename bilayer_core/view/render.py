@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,9 +16,9 @@ from bilayer_core.view.arrows import contact_arrows, reaction_arrows
 from bilayer_core.view.camera import AUTO, HALF_SLOPE, Camera, Insets, Shot, parse_camera, shots
 from bilayer_core.view.colouring import STRAIN, choose_colouring
 from bilayer_core.view.drawable import has_sections, refuse_undrawable
-from bilayer_core.view.ground import Ground
+from bilayer_core.view.ground import Ground, is_edge_on
 from bilayer_core.view.run_at_times import Moment, Moments
-from bilayer_core.view.scales import choose_scales
+from bilayer_core.view.scales import ARROW_SHARE, choose_scales
 from bilayer_core.view.stage import Stage
 from bilayer_core.view.theme import Theme, theme_of
 from bilayer_core.view.window import require_vtk
@@ -26,11 +26,14 @@ from bilayer_core.view.window import require_vtk
 if TYPE_CHECKING:
     from PIL import Image
 
+    from bilayer_core.view.overlay import Overlay
+
 AREA = 1280 * 720  # of a picture whose size is not given [pixels]
 ASPECTS = (0.7, 2.6)  # least and largest width over height of one
 FILM_SIZE = (1280, 720)
 MISSED = 0.1  # part of a run without shapes at its end that is warned of
 SHEET_INSETS = Insets(top=0.10, bottom=0.06, side=0.05)
+NARROW, NOTES_TOP = 1.2, 0.07  # width over height of pictures whose notes stand at the top, and their part of it
 DEEPEST = 40.0  # radius of the ground, in sizes of the robot: squares of a run that goes far are still seen
 
 
@@ -105,6 +108,12 @@ class Studio:
         return float(min(self._run.times[-1], self._run.shape_times[-1]))
 
     @property
+    def _flat_camera(self) -> Camera:
+        """The camera without perspective, by which a robot is as large wherever it went."""
+        camera = self._look.camera
+        return camera if camera.distance is not None else replace(camera, parallel=True)
+
+    @property
     def warning(self) -> str | None:
         """Warning that shapes end long before the run, where they were logged too seldom; None if they do not."""
         end = float(self._run.times[-1])
@@ -119,23 +128,29 @@ class Studio:
         """Return times evenly over the run, from its start to its end [s]."""
         return np.linspace(self.first, self.last, count).tolist() if count > 1 else [self.last]
 
-    def picture(self, path: str | Path, time: float | None = None) -> None:
-        """Write the picture at `time` [s] (default: the end)."""
+    def picture(self, path: str | Path, *times: float) -> None:
+        """Write one picture of the run at `times` [s] (default: the end), with all but the last pale."""
         from bilayer_core.view import sheet
 
-        moment = self.last if time is None else time
-        (picture,) = self.pictures([moment], Insets(), 0.0, time_text([moment]))
-        sheet.save_png(picture, path)
+        moments = sorted(times) or [self.last]
+        camera = self._look.camera if len(moments) == 1 else replace(self._flat_camera, kind="fixed")
+        setting = self._set(moments, Insets(), 0.0, camera)
+        overlay = self._overlay(setting.size, setting.metres_per_pixel, self._notes(setting))
+        written = ", ".join(text.removesuffix(" s") for text in time_text(moments)) + " s"
+        sheet.save_png(overlay.write(next(self._draw(setting, together=True)), written), path)
 
     def sheet(self, path: str | Path, times: Sequence[float]) -> None:
         """Write pictures at `times` [s] as one, over one colour bar and one scale bar."""
         from bilayer_core.view import sheet
 
-        setting = self._set(times, SHEET_INSETS, 0.0)
+        setting = self._set(times, SHEET_INSETS, 0.0, self._flat_camera)
         pictures = list(self._draw(setting))
         columns, scale = sheet.layout_of(len(pictures), *setting.size)
         small = setting.metres_per_pixel / scale
-        footer = self._overlay((sheet.width_of(columns, scale, setting.size), sheet.FOOTER_HEIGHT), small, sheet.TEXT)
+        width, notes = sheet.width_of(columns, scale, setting.size), self._notes(setting)
+        footer = self._overlay(sheet.footer_size(width, 0), small, notes, sheet.TEXT)
+        if footer.aside:
+            footer = self._overlay(sheet.footer_size(width, len(notes)), small, notes, sheet.TEXT)
         sheet.save_png(sheet.put_together(pictures, time_text(times), footer, self._look.theme), path)
 
     def gif(self, path: str | Path, times: Sequence[float], rate: float, note: str = "") -> None:
@@ -150,7 +165,7 @@ class Studio:
         from bilayer_core.view.film import save_mp4
 
         require("films", "imageio_ffmpeg")
-        setting = self._set(times, Insets(), rate, FILM_SIZE)
+        setting = self._set(times, Insets(), rate, size=FILM_SIZE)
         save_mp4(self._written(setting, time_text(times, note)), setting.size, rate, path)
 
     def pictures(
@@ -172,7 +187,7 @@ class Studio:
         return self._written(self._set(times, insets, rate, longest=longest), texts)
 
     def _written(self, setting: _Setting, texts: list[str]) -> Iterator[Image.Image]:
-        overlay = self._overlay(setting.size, setting.metres_per_pixel)
+        overlay = self._overlay(setting.size, setting.metres_per_pixel, self._notes(setting))
         for picture, text in zip(self._draw(setting), texts, strict=True):
             yield overlay.write(picture, text)
 
@@ -181,6 +196,7 @@ class Studio:
         times: Sequence[float],
         insets: Insets,
         rate: float,
+        camera: Camera | None = None,
         size: tuple[int, int] | None = None,
         longest: int | None = None,
     ) -> _Setting:
@@ -190,18 +206,21 @@ class Studio:
                 raise InputError(f"{self._path}: holds {self.first:g} s to {self.last:g} s, and not {time:g} s")
         moments = [self._moments.at(time) for time in times]
         every = [self._moments.all_points(moment, self._scales.metres_per_newton) for moment in moments]
-        robot = [self._moments.robot_points(moment) for moment in moments]
-        camera = self._look.camera
+        robot = [self._moments.robot_points(moment, self._scales.metres_per_newton) for moment in moments]
+        camera = camera or self._look.camera
         size = self._look.size or size
         if size is None:
             aspect = _aspect_of(camera, shots(camera, every, robot, 1.5, insets, rate), every, robot)
             height = (AREA / aspect) ** 0.5
             shrunk = 1.0 if longest is None else longest / max(height, aspect * height)
             size = (2 * round(0.5 * shrunk * aspect * height), 2 * round(0.5 * shrunk * height))
+        if size[0] < NARROW * size[1]:
+            insets = replace(insets, top=insets.top + NOTES_TOP)
         found = shots(camera, every, robot, size[0] / size[1], insets, rate)
         return _Setting(moments, found, size, found[0].metres_per_height / size[1])
 
-    def _draw(self, setting: _Setting) -> Iterator[Image.Image]:
+    def _draw(self, setting: _Setting, together: bool = False) -> Iterator[Image.Image]:
+        """Draw each moment, or all in one picture."""
         scales, targets = self._scales, np.array([shot.target for shot in setting.shots])
         middle = 0.5 * (targets.min(axis=0) + targets.max(axis=0))
         way = 0.5 * float(np.linalg.norm(np.ptp(targets, axis=0)))
@@ -216,27 +235,42 @@ class Studio:
             Ground(middle, radius, scales.cell),
             scales.size,
             self._arrows,
+            setting.has_trail,
         )
         try:
+            if together:
+                yield stage.draw(setting.moments, setting.shots[0])
+                return
             for moment, shot in zip(setting.moments, setting.shots, strict=True):
-                yield stage.draw(moment, shot)
+                yield stage.draw([moment], shot)
         finally:
             stage.close()
 
-    def _overlay(self, size: tuple[int, int], metres_per_pixel: float, text_size: int | None = None):
+    def _overlay(
+        self, size: tuple[int, int], metres_per_pixel: float, notes: list[str], text_size: int | None = None
+    ) -> Overlay:
         from bilayer_core.view.overlay import Overlay
 
-        return Overlay(size, self._look.theme, self._colouring, metres_per_pixel, self._notes(), text_size)
+        return Overlay(size, self._look.theme, self._colouring, metres_per_pixel, notes, text_size)
 
-    def _notes(self) -> list[str]:
-        """Return notes that explain the arrows and squares."""
+    def _notes(self, setting: _Setting) -> list[str]:
+        """Return notes that explain the arrows and squares that are seen."""
+        from bilayer_core.view.overlay import round_length, with_prefix
+
         run, notes = self._run, []
         if run.contact_forces.any():
-            notes.append(f"green: contact force, {10 / self._scales.metres_per_newton:.3g} mN for 10 mm")
+            metres, length = round_length(0.5 * ARROW_SHARE * self._scales.size)
+            notes.append(
+                f"green: contact force, {with_prefix(metres / self._scales.metres_per_newton, 'N')} for {length}"
+            )
         if len(self._arrows) > 1:
             notes.append("blue, purple: force and moment of rods on bodies")
-        planes = any(obstacle.shape.kind == "plane" for obstacle in run.description.obstacles)
-        return notes + ([f"squares of {1e3 * self._scales.cell:g} mm"] if planes else [])
+        if setting.has_trail:
+            notes.append("line: way of the robot's middle")
+        planes = [obstacle.shape for obstacle in run.description.obstacles if obstacle.shape.kind == "plane"]
+        if all(is_edge_on(plane, setting.shots[0]) for plane in planes):
+            return notes
+        return [*notes, f"squares of {round_length(self._scales.cell)[1]}"]
 
 
 @dataclass(frozen=True)
@@ -247,6 +281,11 @@ class _Setting:
     shots: list[Shot]
     size: tuple[int, int]
     metres_per_pixel: float
+
+    @property
+    def has_trail(self) -> bool:
+        """Whether the eye moves, which hides how far the robot went."""
+        return len({tuple(shot.eye) for shot in self.shots}) > 1
 
 
 def _aspect_of(camera: Camera, found: list[Shot], every: list[np.ndarray], robot: list[np.ndarray]) -> float:

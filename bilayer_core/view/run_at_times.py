@@ -74,12 +74,15 @@ class Moments:
             _line(run.clamp_wrenches, *frame),
         )
 
-    def robot_points(self, moment: Moment) -> np.ndarray:
-        """Return the points of the rods, of the bodies that hold them and of the bodies beside them [m], shape (points,
-        3).
+    def robot_points(self, moment: Moment, metres_per_newton: float) -> np.ndarray:
+        """Return the points of the rods, of the bodies that hold them and of the bodies beside them, and the tips of
+        arrows that are no longer than the robot [m], shape (points, 3).
         """
         points = [self._rod_points(moment)]
         middle, size = points[0].mean(axis=0), float(np.ptp(points[0], axis=0).max())
+        arrows = metres_per_newton * moment.contact_forces
+        seen = (np.linalg.norm(arrows, axis=1) < size) & (np.linalg.norm(moment.positions - middle, axis=1) < size)
+        points.append((moment.positions + arrows)[seen])
         for index, body in enumerate(self._run.description.bodies):
             beside = np.linalg.norm(moment.body_positions[index] - middle) <= BESIDE * size
             if body.holds_rods or beside:

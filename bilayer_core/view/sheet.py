@@ -45,6 +45,11 @@ def width_of(columns: int, scale: float, size: tuple[int, int]) -> int:
     return columns * (int(scale * size[0]) + GAP) - GAP
 
 
+def footer_size(width: int, notes: int) -> tuple[int, int]:
+    """Return the size of what is below the pictures, with so many notes above its bars [pixels]."""
+    return width, FOOTER_HEIGHT + round(1.4 * TEXT * notes)
+
+
 def put_together(pictures: list[Image.Image], texts: list[str], footer: Overlay, theme: Theme) -> Image.Image:
     """Return a sheet of equal pictures with their times, row by row, over one line of bars."""
     from bilayer_core.view.overlay import font_of
@@ -54,7 +59,7 @@ def put_together(pictures: list[Image.Image], texts: list[str], footer: Overlay,
     whole, small = width_of(columns, scale, (width, height)), (int(scale * width), int(scale * height))
     rows = len(pictures) // columns
     blank = (*theme.background, 0) if theme.transparent else theme.background
-    sheet = Image.new(mode, (whole, rows * (small[1] + GAP) + FOOTER_HEIGHT), blank)
+    sheet = Image.new(mode, (whole, rows * (small[1] + GAP) + footer.size[1]), blank)
     drawing = ImageDraw.Draw(sheet)
     for index, picture in enumerate(pictures):
         row, column = divmod(index, columns)
@@ -62,8 +67,8 @@ def put_together(pictures: list[Image.Image], texts: list[str], footer: Overlay,
         sheet.paste(picture.resize(small, Image.Resampling.LANCZOS), corner)
         at = corner[0] + TEXT // 2, corner[1] + TEXT // 2
         drawing.text(at, texts[index], theme.text, font_of(TEXT), stroke_width=2, stroke_fill=theme.halo)
-    below = footer.write(Image.new(mode, (whole, FOOTER_HEIGHT), blank))
-    sheet.paste(below, (0, sheet.height - FOOTER_HEIGHT))
+    below = footer.write(Image.new(mode, footer.size, blank))
+    sheet.paste(below, (0, sheet.height - footer.size[1]))
     return sheet
 
 

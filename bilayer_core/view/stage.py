@@ -4,6 +4,7 @@ anything else is seen, drawn with twice as many pixels along each side and made 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +16,9 @@ from bilayer_core.view import geometry
 from bilayer_core.view.arrows import REACTIONS, Arrows
 from bilayer_core.view.camera import Shot
 from bilayer_core.view.colouring import Colouring
-from bilayer_core.view.ground import Ground, add_plane
+from bilayer_core.view.ground import Ground, add_plane, below_edge, is_edge_on
 from bilayer_core.view.run_at_times import Moment, Moments
+from bilayer_core.view.scales import middles_of
 from bilayer_core.view.theme import (
     ARROW_COLOUR,
     BALL_COLOURS,
@@ -26,7 +28,7 @@ from bilayer_core.view.theme import (
     SIDE_SHADE,
     Theme,
 )
-from bilayer_core.view.window import FINER, Part, Window, lay_over, part_around
+from bilayer_core.view.window import FINER, Part, Window, lay_over, part_around, pixels_of
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -47,6 +49,9 @@ fragOutput0 = vec4(ambientColor + (0.55 * near + 0.6 * over) * diffuseColor + sh
 what halves the angle to the eye. VTK's own loop over lights takes one and a half times as long."""
 WORTH_KEEPING = 0.7  # of the size of the part that was drawn last: other sizes cost new buffers
 ARROW_RADIUS = 0.006  # of the shaft of an arrow, in sizes of the robot
+HUB_SIDE = 0.5  # of the block that stands for a body without a surface, in widths of the widest rod
+TRAIL_WIDTH = 0.003  # in heights of the picture
+PALE = 0.5  # opacity of the earlier ones of several moments
 
 
 class Stage:
@@ -67,6 +72,8 @@ class Stage:
         Size of the robot, for the thickness of arrows [m].
     arrows : dict of str to Arrows
         Scales of the arrows that are drawn: ``contact_forces``, ``clamp_forces``, ``clamp_moments``.
+    trail : bool
+        Whether to draw the way of the robot's middle up to each moment.
 
     Raises
     ------
@@ -84,10 +91,12 @@ class Stage:
         ground: Ground,
         arrow_size: float,
         arrows: dict[str, Arrows],
+        trail: bool,
     ):
         self._run, self._moments, self._colouring, self._theme = run, moments, colouring, theme
         self._size, self._ground, self._arrows = size, ground, arrows
         self._arrow_radius = ARROW_RADIUS * arrow_size
+        self._trail = middles_of(run) if trail else None
         self._window = Window(theme, size, clear=True)
         self._renderer = self._window.renderer
         self._all_layers, self._rows, self._nodes = self._chain_layers()
@@ -112,10 +121,33 @@ class Stage:
         if self._background is not None:
             self._background.close()
 
-    def draw(self, moment: Moment, shot: Shot) -> Image.Image:
-        """Draw the run at a time, from an eye: RGB, or RGBA with a transparent background."""
+    def draw(self, moments: Sequence[Moment], shot: Shot) -> Image.Image:
+        """Draw the run from an eye, with all but the last moment pale: RGB, or RGBA with a transparent background."""
         from PIL import Image
 
+        picture = self._picture_behind(shot)
+        if self._trail is not None:
+            self._draw_trail(picture, moments[-1].time, shot)
+        for moment in moments:
+            self._draw_over(picture, moment, shot, moment is not moments[-1])
+        if self._theme.transparent:
+            return Image.frombytes("RGBa", self._size, picture.tobytes()).convert("RGBA")
+        return Image.frombytes("RGB", self._size, picture, "raw", "RGBX")
+
+    def _draw_trail(self, picture: np.ndarray, time: float, shot: Shot) -> None:
+        """Draw the way of the robot's middle until a time."""
+        from PIL import Image, ImageDraw
+
+        way = pixels_of(shot, self._trail[self._run.shape_times <= time], self._size)
+        fine = Image.new("L", (FINER * self._size[0], FINER * self._size[1]))
+        corners = [tuple(at) for at in FINER * way[np.isfinite(way).all(axis=1)]]
+        ImageDraw.Draw(fine).line(corners, 255, max(2, round(TRAIL_WIDTH * fine.size[1])), joint="curve")
+        covered = np.asarray(fine.resize(self._size, Image.Resampling.BOX), np.uint16)[..., None]
+        colour = np.array((*self._theme.text, 255), np.uint16)
+        picture[:] = (covered * colour + (255 - covered) * picture) // 255
+
+    def _draw_over(self, picture: np.ndarray, moment: Moment, shot: Shot, pale: bool) -> None:
+        """Draw all that stands before the ground at one time."""
         points = [self._fixed, self._place_ribbons(moment)]
         points += [self._place_moving(moment, *moving) for moving in self._moving]
         points += [self._place_arrows(name, data, moment) for name, data in self._arrow_data.items()]
@@ -124,15 +156,13 @@ class Stage:
         for (_, actor), hides in zip(self._planes, hiding, strict=True):
             actor.SetVisibility(hides)
         part = self._part(shot, places)
-        picture = self._picture_behind(shot)
-        if part is not None:
-            left, upper, right, lower = part
-            if self._theme.transparent and any(hiding):
-                picture[upper:lower, left:right] = 0  # the ground is drawn with all else
-            lay_over(picture, self._window.draw(shot, part, FINER), part)
-        if self._theme.transparent:
-            return Image.frombytes("RGBa", self._size, picture.tobytes()).convert("RGBA")
-        return Image.frombytes("RGB", self._size, picture, "raw", "RGBX")
+        if part is None:
+            return
+        left, upper, right, lower = part
+        if self._theme.transparent and any(hiding):
+            picture[upper:lower, left:right] = 0  # the ground is drawn with all else
+        drawn = self._window.draw(shot, part, FINER)
+        lay_over(picture, (drawn * PALE).astype(np.uint8) if pale else drawn, part)
 
     def _part(self, shot: Shot, points: np.ndarray) -> Part | None:
         """Return the part of the picture that shows points, as large as the last one unless that is much too large."""
@@ -152,6 +182,16 @@ class Stage:
         return self._behind[1].copy()
 
     def _ground_alone(self, shot: Shot) -> np.ndarray:
+        from PIL import Image, ImageDraw
+
+        picture = Image.fromarray(self._planes_alone(shot), "RGBA")
+        for plane, _ in self._planes:
+            if is_edge_on(plane, shot):
+                fill = (*self._theme.ground[0], 255)
+                ImageDraw.Draw(picture).polygon(below_edge(plane, shot, self._size), fill)
+        return np.array(picture)
+
+    def _planes_alone(self, shot: Shot) -> np.ndarray:
         width, height = self._size
         if self._background is None:
             empty = (0, 0, 0, 0) if self._theme.transparent else (*self._theme.background, 255)
@@ -203,12 +243,19 @@ class Stage:
         return np.concatenate(found)
 
     def _add_moving(self) -> list[tuple[Any, np.ndarray, int]]:
-        """Return the bodies as they are, and joints on them; a body without a surface has nothing to draw."""
+        """Return the bodies as they are, blocks for those without a surface that hold rods, and joints on bodies."""
         of = self._run.description
         bodies = [
             (*self._add_shape(body.shape, BALL_COLOURS), index)
             for index, body in enumerate(of.bodies)
             if body.shape is not None
+        ]
+        side = HUB_SIDE * max(float(strand.width.max()) for strand in of.strands)
+        block = ShapeInfo("box", (side, side, side), 0.1 * side, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+        bodies += [
+            (*self._add_shape(block, JOINT_COLOURS), index)
+            for index, body in enumerate(of.bodies)
+            if body.shape is None and body.holds_rods
         ]
         joints = [(*self._add_shape(j.shape, JOINT_COLOURS), j.body) for j in of.joints if j.body >= 0]
         return bodies + joints
@@ -248,7 +295,7 @@ class Stage:
         blank = np.zeros((count, 3), np.float32)
         shades = np.zeros((count, 3), np.uint8)
         data = _poly_data(blank, blank.copy(), shades, np.concatenate(triangles))
-        self._add(data, 0.62, 0.42, 0.06)
+        self._add(data, 0.8, 0.22)  # nearly the colours of the bar, with enough shade to see how it bends
         return data
 
     def _place_ribbons(self, moment: Moment) -> np.ndarray:

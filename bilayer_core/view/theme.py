@@ -8,11 +8,11 @@ from bilayer_core.errors import InputError
 
 BACKGROUND = (28, 30, 34)
 OBSTACLE_COLOURS = ((112, 122, 138), (98, 107, 122))
-BALL_COLOURS = ((245, 166, 35), (250, 244, 232))
+BALL_COLOURS = ((245, 166, 35), (226, 217, 200))
 JOINT_COLOURS = ((205, 210, 218), (150, 156, 166))
 ARROW_COLOUR = (64, 224, 148)
 REACTION_COLOURS = {"clamp_forces": (80, 160, 255), "clamp_moments": (200, 110, 235)}
-SIDE_SHADE = 0.55  # brightness of the narrow faces of ribbons
+SIDE_SHADE = 0.9  # brightness of the narrow faces of ribbons: layers are read there, by the colour bar
 Colour = tuple[int, int, int]
 
 

@@ -191,6 +191,20 @@ def _both(lanes: np.ndarray) -> np.ndarray:
     return ((lanes + (lanes >> 32)) & 0xFFFFFFFF) + 0x20002
 
 
+def pixels_of(shot: Shot, points: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """Return columns and rows of points in a picture of a size, shape (points, 2); NaN beside the eye and behind it."""
+    back = shot.eye - shot.target
+    distance = np.linalg.norm(back)
+    back = back / distance
+    x, y, z = ((points - shot.eye) @ np.stack([np.cross(shot.up, back), shot.up, back]).T).T
+    if shot.half_height is None:
+        half = np.where(z < -1e-3 * distance, -HALF_SLOPE * z, np.nan)
+    else:
+        half = np.full(len(z), shot.half_height)
+    width, height = size
+    return np.stack([0.5 * (width + height * x / half), 0.5 * height * (1.0 - y / half)], axis=1)
+
+
 def part_around(shot: Shot, points: np.ndarray, size: tuple[int, int], least: tuple[int, int] = (1, 1)) -> Part | None:
     """Return the part of a picture that shows points, with some room.
 
@@ -209,19 +223,11 @@ def part_around(shot: Shot, points: np.ndarray, size: tuple[int, int], least: tu
     tuple of int or None
         None if none of the points is seen.
     """
-    back = shot.eye - shot.target
-    back = back / np.linalg.norm(back)
-    x, y, z = ((points - shot.eye) @ np.stack([np.cross(shot.up, back), shot.up, back]).T).T
-    if shot.half_height is None:
-        if z.max() >= -1e-3 * np.linalg.norm(shot.eye - shot.target):
-            return (0, 0, *size)
-        half = -HALF_SLOPE * z
-    else:
-        half = np.full(len(z), shot.half_height)
-    width, height = size
-    columns, rows = 0.5 * (width + height * x / half), 0.5 * height * (1.0 - y / half)
+    places = pixels_of(shot, points, size)
+    if not len(places) or np.isnan(places).any():
+        return (0, 0, *size) if len(places) else None
     edges = []
-    for seen, most, smallest in ((columns, width, least[0]), (rows, height, least[1])):
+    for seen, most, smallest in zip(places.T, size, least, strict=True):
         first, last = math.floor(seen.min()) - ROOM, math.ceil(seen.max()) + ROOM
         first, last = max(first, 0), min(last, most)
         if first >= last:

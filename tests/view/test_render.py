@@ -22,6 +22,7 @@ from bilayer_core.view.overlay import round_length
 from bilayer_core.view.render import Look, Studio
 from bilayer_core.view.scales import ARROW_SHARE, choose_scales, seen_from
 from bilayer_core.view.theme import BACKGROUND
+from bilayer_core.view.window import pixels_of
 
 SIZE = (480, 360)
 
@@ -83,7 +84,7 @@ def test_what_is_looked_at_is_in_the_middle_and_slopes_are_those_of_perspective(
         (["--gif", "x.png"], "x.png: must end in .gif"),
         (["--png", "x.png", "--sheet", "x.png"], "x.png: is named for two outputs"),
         (["--sheet", "x.png", "--at", "1", "--frames", "3"], "--frames: says how many pictures, --at of which times"),
-        (["--png", "x.png", "--at", "1", "--at", "2"], "--png: is one picture"),
+        (["--png", "x.png", "--frames", "2"], "--png: is one picture"),
         (["--gif", "x.gif", "--frames", "100000000"], "100000000 is not in the range 1<=x<=20000"),
         (["--gif", "x.gif", "--frames", "401"], "--frames: 401 is not in the range 1<=x<=400; a film may have more"),
         (["--gif", "x.gif", *401 * ["--at", "1"]], "--at: is given 401 times; at most 400 are allowed"),
@@ -198,15 +199,73 @@ def test_backgrounds_are_what_was_asked_for(drawn):
     assert 0.2 < (clear[..., 3] > 0).mean() < 0.95
 
 
-def test_a_body_without_a_surface_is_not_drawn(log, drawn, monkeypatch):
-    """Nothing is between the four arms where the hub is."""
-    image = drawn(4.0, camera="top", background="transparent")
-    found = []
-    add = stage.Stage._add_shape
-    noted = lambda self, shape, *of: found.append(shape.kind) or add(self, shape, *of)  # noqa: E731
-    monkeypatch.setattr(stage.Stage, "_add_shape", noted)
-    Studio(log, Look.of(size=SIZE)).picture(log.with_name("nothing.png"))
-    assert found == ["sphere"] and image.any()
+def test_a_body_without_a_surface_that_holds_rods_is_a_block(drawn, monkeypatch):
+    with_block = drawn(4.0, camera="top")
+    monkeypatch.setattr(stage, "HUB_SIDE", 0.1)
+    middle = (slice(SIZE[1] // 4, SIZE[1] // 2), slice(SIZE[0] // 3, 2 * SIZE[0] // 3))
+    without = drawn(4.0, camera="top ")[middle]
+    assert (np.abs(with_block[middle] - without).max(axis=2) > 20).sum() > 100
+
+
+@pytest.mark.parametrize("camera", ["top", "iso", "front"])
+def test_faces_have_the_colours_of_the_bar(log, drawn, camera):
+    """The largest strain of the upper layer, as bright as the bar within a fifth, on wide and on narrow faces."""
+    image = drawn(4.0, camera=camera, background="white")
+    run = read_log(log)
+    colouring = choose_colouring(run)
+    active = [run.strain_of(layer)[-1] for layer in run.description.layers if layer.layer == "active"]
+    low, high = (255 * colouring.colours(np.array([end]))[0, :3] for end in (np.min(active), np.max(active)))
+    seen = image[ROBOT][is_red(image[ROBOT])][:, 0]
+    assert np.percentile(seen, 5) > 0.78 * min(low[0], high[0]) and np.percentile(seen, 95) < 1.02 * max(
+        low[0], high[0]
+    )
+
+
+def test_ground_that_is_seen_from_the_side_fills_what_is_below_it(log, drawn):
+    image = drawn(0.0, camera="front", background="white")
+    setting = Studio(log, Look.of("front", size=SIZE))._set([0.0], Insets(), 0.0)
+    (_, row), (_, above) = pixels_of(setting.shots[0], np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.01]]), SIZE)
+    column = image[:, 3].mean(axis=1)
+    edge = np.flatnonzero(column < 250)[0]
+    assert abs(edge - row) <= 1 and above < row and (column[edge:] < 250).all()
+
+
+@pytest.mark.parametrize("size", [(480, 360), (240, 360)])
+def test_the_meaning_of_arrows_and_squares_is_in_pictures_of_every_shape(log, size):
+    studio = Studio(log, Look.of(size=size))
+    setting = studio._set([4.0], Insets(), 0.0)
+    notes = studio._notes(setting)
+    assert [note.partition(" ")[0] for note in notes] == ["green:", "squares"]
+    written = [
+        np.asarray(studio._overlay(size, setting.metres_per_pixel, of).write(Image.new("RGB", size, "white")))
+        for of in (notes, [])
+    ]
+    apart = np.any(written[0] != written[1], axis=2)
+    assert apart.sum() > 400 and not apart[0].any() and not apart[:, [0, -1]].any()
+
+
+def test_several_instants_in_one_picture_are_pale_but_for_the_last(log, tmp_path, monkeypatch):
+    studio = Studio(log, Look.of(size=SIZE, background="white"))
+    studio.picture(tmp_path / "pale.png", 4.0, 1.2)
+    monkeypatch.setattr(stage, "PALE", 1.0)
+    studio.picture(tmp_path / "full.png", 4.0, 1.2)
+    pale, full = (pixels(tmp_path / f"{name}.png")[ROBOT] for name in ("pale", "full"))
+    earlier = np.abs(pale - full).max(axis=2) > 20
+    assert earlier.sum() > 1000 and (pale[earlier].mean(axis=1) > full[earlier].mean(axis=1)).mean() > 0.9
+    assert is_red(pale[~earlier]).sum() > 1000
+
+
+def test_a_camera_that_follows_shows_the_way_and_whole_arrows(log):
+    studio = Studio(log, Look.of("follow", size=SIZE, background="white"))
+    times = [2.5, 3.2, 4.0]
+    setting = studio._set(times, Insets(), 0.0)
+    assert "line: way of the robot's middle" in studio._notes(setting)
+    below = []
+    for picture in studio._draw(setting):
+        image = np.asarray(picture.convert("RGB")).astype(int)
+        assert not is_arrow(image)[[0, -1]].any() and not is_arrow(image)[:, [0, -1]].any()
+        below.append((image[-40:, SIZE[0] // 2 - 60 : SIZE[0] // 2 + 60].max(axis=2) < 90).sum())
+    assert below[2] >= 40 > below[0]  # one pixel in each row at least
 
 
 @pytest.mark.parametrize("look", [{}, {"camera": "top"}, {"background": "transparent"}, {"camera": "20,5,0.12 m"}])
