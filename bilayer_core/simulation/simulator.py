@@ -129,7 +129,9 @@ class Simulator:
         self._controls = Controls(self._stepper, self._state)
         self._unsettled = scene.start == SETTLE
         self._loop = RunLoop(self._stepper, self._state, self._controls, self.plane_watch, self._settle)
-        self._present = Present(self._stepper, lambda: self._now, self._loop.compile)
+        self._present = Present(
+            self._stepper, lambda: self._now, self._loop.compile, lambda: self.description, self.frame
+        )
         self._note_start()
 
     def __repr__(self) -> str:

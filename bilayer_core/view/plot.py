@@ -84,7 +84,7 @@ def lines_of(run: RunData, number: int, wanted: Sequence[str], node: int | None 
     number : int
         Of the run, among those that are drawn.
     wanted : sequence of str
-        Names such as ``com``, ``com.z``, ``energy/*`` or ``rod/strip/laminate/position.z``.
+        Names such as ``com``, ``com.z``, ``energy/*`` or ``rod/strip/position.z``.
     node : int, optional
         Which node of a rod, from the end if negative; by default the last one.
 

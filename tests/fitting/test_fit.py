@@ -122,7 +122,7 @@ def test_a_parameter_at_its_bound_has_no_interval_and_is_named(noisy):
 
 
 def test_curvature_and_forces_are_data_too():
-    names = ["rod/strip/laminate/curvature[5]", "body/wall/clamp_wrench.my"]
+    names = ["rod/strip/curvature[5]", "body/wall/clamp_wrench.my"]
     columns = data_of(load_scene(SCENE), 0.04 * np.arange(1, 9), names)
     sigma = {names[0]: 0.1, names[1]: "1 mN*mm"}
     assert fit(SCENE, columns, PARAMETERS, sigma=sigma).values == pytest.approx(TRUTH, rel=1e-6)

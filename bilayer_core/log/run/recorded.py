@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bilayer_core.extras import require
-from bilayer_core.log.run.quantities import AXES, Entry, Quantity, unknown_quantity
+from bilayer_core.log.run.quantities import AXES, Entry, Quantity, present_name, unknown_quantity
 from bilayer_core.observed.frame import Description
 
 if TYPE_CHECKING:
@@ -79,6 +79,7 @@ class Recorded(ABC):
             If there is none; the message has the nearest names.
         """
         known = self.quantities
+        name = present_name(name, known)
         if name not in known:
             raise unknown_quantity(name, known, self.why_not(name))
         return known[name]

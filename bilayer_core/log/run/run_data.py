@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from bilayer_core.log.messages.events import Event
+from bilayer_core.log.messages.node_frames import node_order
+from bilayer_core.log.run.frame_values import joined
 from bilayer_core.log.run.quantities import Entry, Quantity, entries, quantities_of
 from bilayer_core.log.run.recorded import Recorded
 from bilayer_core.observed.frame import Description, Strand
@@ -94,6 +96,16 @@ class RunData(Recorded):
             f"RunData({self.description.scene_name}: {span}, {len(self.times)} frames, {len(self.shape_times)} shapes, "
             f"{len(self.quantities)} quantities: {names}, …)"
         )
+
+    @property
+    def points(self) -> np.ndarray:
+        """Position, strain, curvature and contact force of every node, shape (shapes, node_count, 8)."""
+        return joined(self.positions, self.strain[..., None], self.curvature[..., None], self.contact_forces)
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Positions and material frames of the nodes of strands, shape (shapes, strand nodes, 7)."""
+        return joined(self.positions[:, node_order(self.description)], self.material_frames)
 
     def strain_of(self, layer: Strand) -> np.ndarray:
         """Return the axial strain in the middle of a layer.
