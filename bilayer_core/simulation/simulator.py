@@ -108,7 +108,7 @@ class Simulator:
         tolerance: float | None = None,
         budget: bool = False,
     ) -> None:
-        scene = scene if isinstance(scene, SceneConfig) else load_scene(scene)
+        scene = load_scene(scene)
         self.plan = make_plan(scene, model=model, dimension=dimension, integrator=integrator)
         method = INTEGRATORS[self.plan.integrator]
         self._asked_steps = dt, tolerance
@@ -659,7 +659,7 @@ class Simulator:
             If its model is another, or somebody observes the run: a log is of one scene. Nothing is changed then.
         """
         if scene is not None:
-            self._take_scene(scene if isinstance(scene, SceneConfig) else load_scene(scene))
+            self._take_scene(load_scene(scene))
         self._controls.note(RESET, "")
         self._state.take(self._initial_state())
         self._unsettled = self.scene.start == SETTLE

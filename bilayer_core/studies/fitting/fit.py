@@ -97,9 +97,7 @@ def fit(
 
 
 def _configured(scene: Any, overrides: Overrides, dt: float | str | None) -> SceneConfig:
-    config = scene if isinstance(scene, SceneConfig) else load_scene(scene, overrides)
-    if isinstance(scene, SceneConfig) and overrides:
-        config = load_scene(scene_content(scene), overrides)
+    config = load_scene(scene, overrides)
     return config if dt is None else load_scene(scene_content(config), {"solver.dt": dt, "solver.tolerance": None})
 
 
