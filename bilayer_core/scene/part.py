@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from functools import cache, cached_property
 from inspect import Parameter, Signature
+from keyword import iskeyword
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeVar, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
@@ -78,7 +79,9 @@ class _Made(type(BaseModel)):  # type: ignore[misc]
             """Signature that editors show: the keys and their defaults."""
             required = {name: Parameter.empty for name, field in cls.model_fields.items() if field.is_required()}
             defaults = {name: field.default for name, field in cls.model_fields.items()} | required | dict(_tags(cls))
-            return Signature(Parameter(name, Parameter.KEYWORD_ONLY, default=of) for name, of in defaults.items())
+            keys = {name: cls.model_fields[name].alias or name for name in defaults}
+            named = {name: name if iskeyword(key) else key for name, key in keys.items()}
+            return Signature(Parameter(named[k], Parameter.KEYWORD_ONLY, default=of) for k, of in defaults.items())
 
         @__signature__.setter
         def __signature__(cls, value: object) -> None:

@@ -45,7 +45,7 @@ def strip(material="gel", **others):
         title="Two layers on a wall",
         duration="0.1 s",
         materials={"gel": Material(youngs_modulus="1 MPa", poisson_ratio=0.5, density=1100)},
-        stimuli={"heat": Stimulus(schedule=Hold(held_value=0.5))},
+        stimuli={"heat": Stimulus(schedule=Hold(value=0.5))},
         rods=[
             Rod(name="arm", width="1 cm", path=path, normal=[0, 0, 1], stations=11, layers=layers, clamp_start="wall")
         ],

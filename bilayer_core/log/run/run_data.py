@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from bilayer_core.extras import of_notebook
 from bilayer_core.log.messages.events import Event
 from bilayer_core.log.messages.node_frames import node_order
 from bilayer_core.log.run.frame_values import joined
@@ -106,6 +108,38 @@ class RunData(Recorded):
     def nodes(self) -> np.ndarray:
         """Positions and material frames of the nodes of strands, shape (shapes, strand nodes, 7)."""
         return joined(self.positions[:, node_order(self.description)], self.material_frames)
+
+    def film(self, seconds: float | None = None, **look: Any) -> Any:
+        """Draw the run as a film without a screen; needs VTK and pillow.
+
+        Parameters
+        ----------
+        seconds : float, optional
+            How long it lasts; by default as long as the run, and 2 to 8 s.
+        **look
+            ``camera``, ``background``, ``colour``, ``size``, ``reactions``: words of ``bilayer render``.
+
+        Returns
+        -------
+        Shown
+            Notebooks play it; ``save(path)`` writes it, as WebP.
+        """
+        return of_notebook("film")(self, seconds, look)
+
+    def show(self, **look: Any) -> Any:
+        """Show the run in space: in rerun, where `rerun-notebook` is installed, otherwise as a picture of its end.
+
+        Parameters
+        ----------
+        **look
+            As of `film`.
+
+        Returns
+        -------
+        object
+            A notebook shows it.
+        """
+        return of_notebook("show")(self, look)
 
     def strain_of(self, layer: Strand) -> np.ndarray:
         """Return the axial strain in the middle of a layer.
