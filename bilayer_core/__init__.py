@@ -1,7 +1,8 @@
 """Simulation of bilayer soft robots: scenes, the numerical core, logs, pictures and the command line.
 
 ``load_scene``, ``Simulator``, ``Recorder``, ``estimate_error``, ``fit``, ``read_log``, ``compare``, ``sweep``,
-``optimise``, ``read_results`` and ``__version__`` are loaded at their first use: importing the package costs nothing.
+``optimise``, ``read_results``, ``__version__`` and the classes of scenes (``Scene``, ``Rod``, ``Layer``, ...) are
+loaded at their first use: importing the package costs nothing.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ if TYPE_CHECKING:  # what checkers of types take for true, without an import of 
     from bilayer_core.log.run.log_reader import read_log
     from bilayer_core.log.run.recorder import Recorder
     from bilayer_core.scene.loader import load_scene
+    from bilayer_core.scene.scene_classes import *
     from bilayer_core.simulation.simulator import Simulator
     from bilayer_core.studies.converge.study import estimate_error
     from bilayer_core.studies.fitting.fit import fit
@@ -38,8 +40,70 @@ _HOME = {
 }
 
 __all__ = [
+    "AddedMass",
+    "ArcPath",
+    "Body",
+    "BodyDrag",
+    "Box",
+    "BoxObstacle",
+    "Coefficients",
+    "Contact",
+    "ContactPoint",
+    "Coupling",
+    "Cylinder",
+    "CylinderObstacle",
+    "Damping",
+    "Diffusion",
+    "Eigenstrain",
+    "Face",
+    "FibreDirection",
+    "Fibres",
+    "Fluid",
+    "Free",
+    "Friction",
+    "Grid",
+    "Guided",
+    "HelixPath",
+    "Hold",
+    "Imperfection",
+    "Joint",
+    "Layer",
+    "Light",
+    "Listed",
+    "Load",
+    "Material",
+    "Mirror",
+    "Output",
+    "Placed",
+    "Plane",
+    "PlaneObstacle",
+    "PointMass",
+    "PolylinePath",
+    "Prescribed",
+    "PulseTrain",
+    "Ramp",
     "Recorder",
+    "Rod",
+    "Rotation",
+    "Scene",
+    "Sequence",
+    "SequencePart",
     "Simulator",
+    "Sine",
+    "Sliding",
+    "Solver",
+    "Source",
+    "Sphere",
+    "SphereObstacle",
+    "SpiralPath",
+    "SplinePath",
+    "Square",
+    "StiffnessChange",
+    "Stimulus",
+    "StraightPath",
+    "Table",
+    "Translation",
+    "Turning",
     "__version__",
     "compare",
     "estimate_error",
@@ -55,8 +119,8 @@ __all__ = [
 def __getattr__(name: str) -> object:
     if name == "__version__":
         return _installed_version()
-    if name in _HOME:
-        return getattr(import_module(_HOME[name]), name)
+    if name in __all__:
+        return getattr(import_module(_HOME.get(name, "bilayer_core.scene.scene_classes")), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -6,7 +6,9 @@ Extras are read from the metadata of the installed package, so that setup.py alo
 from __future__ import annotations
 
 import re
+from importlib import import_module
 from importlib.util import find_spec
+from typing import Any
 
 from bilayer_core import DISTRIBUTION
 from bilayer_core.errors import InputError
@@ -37,6 +39,11 @@ def require(what: str, *modules: str) -> None:
     missing = [module for module in modules if find_spec(module) is None]
     if missing:
         raise missing_library(what, missing[0], *modules)
+
+
+def of_notebook(name: str) -> Any:
+    """Return a function of `bilayer_core.view.notebook`, which runs have as methods and their parts may not import."""
+    return getattr(import_module("bilayer_core.view.notebook"), name)
 
 
 def missing_library(what: str, module: str, *together: str) -> InputError:

@@ -6,6 +6,9 @@ Both are shown as the escapes of a Python string, such as ``\\x1b`` and ``\\u202
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from html import escape
+
 LONGEST_TEXT = 120
 """Characters of a name or value that are shown."""
 LONGEST_LINE = 2_000
@@ -32,3 +35,13 @@ def shortened(text: str, most: int = LONGEST_TEXT) -> str:
 def printable(text: str) -> str:
     """Return a text of several lines that can be printed: each as `shortened` makes it, at most `LONGEST_LINE` long."""
     return "\n".join(shortened(line, LONGEST_LINE) for line in text.split("\n"))
+
+
+def html_table(title: str, rows: Mapping[str, object]) -> str:
+    """Return a small table for notebooks: a title, and a row of each name and its value."""
+    cells = "".join(
+        f"<tr><th style='text-align:left'>{escape(shortened(name))}</th>"
+        f"<td style='text-align:left'>{escape(shortened(str(value)))}</td></tr>"
+        for name, value in rows.items()
+    )
+    return f"<table><caption style='text-align:left'><b>{escape(shortened(title))}</b></caption>{cells}</table>"

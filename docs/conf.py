@@ -46,6 +46,9 @@ version = release = bilayer_core.__version__
 extensions = ["myst_nb", "numpydoc", "sphinx.ext.autodoc", "sphinx.ext.autosummary"]
 myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 4
+nb_execution_in_temp = True  # logs and pictures of notebooks are not kept
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300
 autodoc_member_order = "bysource"
 numpydoc_show_class_members = False
 html_theme = "pydata_sphinx_theme"

@@ -27,7 +27,7 @@ def plot(
     labels: tuple[str, ...],
     force: bool,
 ) -> None:
-    """Draw quantities of logs over time: com.z, 'energy/*', rod/strip/laminate/position.z.
+    """Draw quantities of logs over time: com.z, 'energy/*', rod/strip/position.z.
 
     Quantities of one unit share a panel; those of several logs are drawn over each other. `bilayer info LOG
     --quantities` lists all names.

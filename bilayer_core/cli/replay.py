@@ -13,8 +13,9 @@ from bilayer_core.cli.nodes import become_replay_node
 from bilayer_core.cli.options import DIFFERS, Duration, Verb, named_numbers, set_option
 from bilayer_core.cli.signals import Interruption
 from bilayer_core.cli.terminal import say
-from bilayer_core.cli.watch import Interrupt, compile_kernels, count_bar, progress_bar
+from bilayer_core.cli.watch import Interrupt, compile_kernels, count_bar
 from bilayer_core.errors import InputError
+from bilayer_core.simulation.progress_bar import progress_bar
 
 if TYPE_CHECKING:
     from bilayer_core.runs.replay import Verification

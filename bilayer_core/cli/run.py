@@ -16,8 +16,9 @@ from bilayer_core.cli.options import Duration, Rate, Verb, named_numbers, scene_
 from bilayer_core.cli.report import summary_lines
 from bilayer_core.cli.signals import Interruption
 from bilayer_core.cli.terminal import say
-from bilayer_core.cli.watch import Interrupt, compile_kernels, progress_bar
+from bilayer_core.cli.watch import Interrupt, compile_kernels
 from bilayer_core.errors import BilayerError, InputError, OutputError, SimulationError, naming
+from bilayer_core.simulation.progress_bar import progress_bar
 
 if TYPE_CHECKING:
     from bilayer_core.scene.config import SceneConfig

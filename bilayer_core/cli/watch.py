@@ -15,8 +15,6 @@ from bilayer_core.cli.terminal import say
 COMPILING_NOTICE = "compiling kernels, once for this version on this machine (up to a minute) ..."
 TELL_EVERY = 10.0
 """Wall time between two lines about many runs, without a screen [s]."""
-REFRESH = 0.1
-"""Wall time between two updates of the progress bar [s]."""
 
 
 class Interrupt:
@@ -86,46 +84,6 @@ def pieces_bar(total: int) -> Iterator[Callable[[int, int], None]]:
     with Progress(BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), console=Console(stderr=True)) as bar:
         task = bar.add_task("", total=total)
         yield lambda done, total: bar.update(task, completed=done)
-
-
-@contextmanager
-def progress_bar(name: str, begin: float, end: float, quiet: bool) -> Iterator[Callable[[float], None]]:
-    """Show a bar on stderr with the simulated time, real-time factor and time left. Yield a function to set the time.
-
-    Parameters
-    ----------
-    name : str
-        Of the scene.
-    begin, end : float
-        Simulated time at the ends of the bar [s].
-    """
-    if quiet or not sys.stderr.isatty():
-        yield lambda time: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    bar = Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.fields[time]:.2f}/{task.fields[end]:g} s"),
-        TextColumn("real time x {task.fields[factor]:.2f}"),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=Console(stderr=True),
-    )
-    started = shown = clock.perf_counter()
-    with bar:
-        task = bar.add_task(name, total=end - begin, time=begin, end=end, factor=0.0)
-
-        def show(time: float) -> None:
-            nonlocal shown
-            now = clock.perf_counter()
-            if now - shown >= REFRESH or time >= end:
-                shown = now
-                bar.update(task, completed=time - begin, time=time, factor=(time - begin) / (now - started))
-
-        yield show
 
 
 @contextmanager

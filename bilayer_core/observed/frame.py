@@ -41,6 +41,8 @@ class Strand:
         Whether its sections are round, as wide as thick.
     strip : bool
         Whether its sections bend, see `Frame.section_curvature`.
+    first_station : int or None
+        That of the rod at which it begins; None in older logs.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Strand:
     closed: bool = False
     round: bool = False
     strip: bool = False
+    first_station: int | None = 0
 
     def __repr__(self) -> str:
         parts = f", layers {', '.join(part.layer for part in self.layers)}" if self.layers else ""

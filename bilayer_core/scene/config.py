@@ -280,7 +280,7 @@ class SceneConfig(Part):
     def __repr__(self) -> str:
         counts = f"{len(self.rods)} rods, {len(self.bodies)} bodies, {len(self.obstacles)} obstacles"
         channels = ", ".join(self.stimuli) or "none"
-        return f"SceneConfig({self.name}: {counts}, {self.duration:g} s; channels: {shortened(channels)})"
+        return f"Scene({self.name}: {counts}, {self.duration:g} s; channels: {shortened(channels)})"
 
     __str__ = __repr__
 

@@ -18,14 +18,14 @@ from bilayer_core.scene.overrides import Overrides, read_overrides
 from bilayer_core.scene.text import read_yaml, write_yaml
 
 
-def load_scene(scene: str | Path | Mapping[str, Any], overrides: Overrides = ()) -> SceneConfig:
+def load_scene(scene: str | Path | Mapping[str, Any] | SceneConfig, overrides: Overrides = ()) -> SceneConfig:
     """Load and validate a scene.
 
     Parameters
     ----------
-    scene : str, Path or mapping
-        Path of a YAML file, name of a bundled scene, or the content of a scene. Files that a scene names are relative
-        to its own file, for a mapping to the working directory.
+    scene : str, Path, mapping or Scene
+        Path of a YAML file, name of a bundled scene, the content of a scene, or a scene. Files that a scene names are
+        relative to its own file, for a mapping to the working directory.
     overrides : sequence of str, or mapping
         Values to change: ``["rods.arm.stations=100"]`` or ``{"rods.arm.stations": 100}``. A text may have a unit, a
         number is in SI units.
@@ -40,8 +40,10 @@ def load_scene(scene: str | Path | Mapping[str, Any], overrides: Overrides = ())
     SceneError
         One line for each fault: file, key path, the value found, what is allowed.
     """
+    if isinstance(scene, SceneConfig):
+        return load_content(scene_content(scene), overrides, f"scene {scene.name}") if overrides else scene
     if not isinstance(scene, Mapping | str | Path):
-        demand = "must be the path of a scene file, the name of a bundled scene, or a mapping"
+        demand = "must be the path of a scene file, the name of a bundled scene, a mapping, or a Scene"
         raise SceneError(f"scene: found {type(scene).__name__}; {demand}")
     if isinstance(scene, Mapping):
         return _validated(dict(scene), "scene", overrides, Path())

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable, Iterable, Mapping
-from functools import cached_property
-from typing import Annotated, Any, Self, TypeVar
+from functools import cache, cached_property
+from inspect import Parameter, Signature
+from keyword import iskeyword
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeVar, get_args, get_origin
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from bilayer_core.errors import SceneError
 from bilayer_core.names import LONGEST_NAME, NAME
 from bilayer_core.printable import shortened
-from bilayer_core.scene.faults import Fault, refuse, refuse_all
+from bilayer_core.scene.faults import Fault, refuse, refuse_all, tell
 from bilayer_core.scene.units import (
     AngularSpeed,
     Length,
@@ -66,7 +69,62 @@ def _bare(part: Derived) -> Derived:
     return part
 
 
-class Part(BaseModel):
+class _Made(type(BaseModel)):  # type: ignore[misc]
+    """The class of parts: what a program makes by calling one is checked, and told, as the content of a file is."""
+
+    if not TYPE_CHECKING:  # checkers take the signature of the class
+
+        @property
+        def __signature__(cls) -> Signature:
+            """Signature that editors show: the keys and their defaults."""
+            required = {name: Parameter.empty for name, field in cls.model_fields.items() if field.is_required()}
+            defaults = {name: field.default for name, field in cls.model_fields.items()} | required | dict(_tags(cls))
+            keys = {name: cls.model_fields[name].alias or name for name in defaults}
+            named = {name: name if iskeyword(key) else key for name, key in keys.items()}
+            return Signature(Parameter(named[k], Parameter.KEYWORD_ONLY, default=of) for k, of in defaults.items())
+
+        @__signature__.setter
+        def __signature__(cls, value: object) -> None:
+            """Refuse that of pydantic, which writes out every validator."""
+
+        def __call__(cls, **values: Any) -> Any:
+            """Return the part. A key with one allowed value, such as the `shape` of a path, need not be given.
+
+            Raises
+            ------
+            SceneError
+                One line for each fault, as `load_scene`.
+            """
+            fields = cls.model_fields
+            content = {fields[name].alias or name: value for name, value in _tags(cls)}
+            content |= {(fields[key].alias or key) if key in fields else key: value for key, value in values.items()}
+            try:
+                return super().__call__(**content)
+            except ValidationError as error:
+                own = f" {shortened(values['name'])}" if isinstance(values.get("name"), str) else ""
+                raise SceneError(
+                    tell(error, cls, _plain(content), f"{cls.__name__.removesuffix('Config')}{own}")
+                ) from None
+
+
+@cache
+def _tags(of: type[BaseModel]) -> list[tuple[str, Any]]:
+    """Return the names of fields that have to be given and allow one value, with that value."""
+    choices = {name: get_args(f.annotation) for name, f in of.model_fields.items() if f.is_required()}
+    literal = {name for name in choices if get_origin(of.model_fields[name].annotation) is Literal}
+    return [(name, values[0]) for name, values in choices.items() if name in literal and len(values) == 1]
+
+
+def _plain(value: Any) -> Any:
+    """Return a value with its parts as mappings, in which faults are found by names."""
+    if isinstance(value, BaseModel):
+        return value.model_dump(by_alias=True)
+    if isinstance(value, Mapping):
+        return {key: _plain(held) for key, held in value.items()}
+    return [_plain(held) for held in value] if isinstance(value, list | tuple) else value
+
+
+class Part(BaseModel, metaclass=_Made):
     """Unknown keys are faults, and nothing changes after validation."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)

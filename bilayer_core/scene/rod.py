@@ -36,14 +36,14 @@ from bilayer_core.scene.units import (
 Eigenstrains = Annotated[
     list[Eigenstrain],
     BeforeValidator(
-        lambda laws: [] if laws is None else [laws] if isinstance(laws, dict) else laws,
+        lambda laws: [] if laws is None else [laws] if isinstance(laws, dict | Part) else laws,
         json_schema_input_type=Eigenstrain | list[Eigenstrain] | None,
     ),
 ]
 Diffusions = Annotated[
     list[Diffusion],
     BeforeValidator(
-        lambda fields: [] if fields is None else [fields] if isinstance(fields, dict) else fields,
+        lambda fields: [] if fields is None else [fields] if isinstance(fields, dict | Part) else fields,
         json_schema_input_type=Diffusion | list[Diffusion] | None,
     ),
 ]

@@ -75,6 +75,7 @@ def strand(s: StrandArrays) -> Strand:
         s.closed,
         s.round,
         s.strip,
+        s.first_station,
     )
 
 

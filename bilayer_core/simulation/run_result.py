@@ -4,6 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import TYPE_CHECKING, Any
+
+from bilayer_core.errors import InputError
+from bilayer_core.printable import html_table
+
+if TYPE_CHECKING:
+    from bilayer_core.log.run.run_data import RunData
 
 
 class Termination(Enum):
@@ -30,6 +37,8 @@ class RunResult:
         Of this run.
     cpu_time, wall_time : float
         CPU seconds of the stepping thread and elapsed seconds, without compilation.
+    log : str
+        The file that the run was asked to write; empty for none.
     """
 
     termination: Termination
@@ -38,3 +47,49 @@ class RunResult:
     steps: int
     cpu_time: float
     wall_time: float
+    log: str = ""
+
+    @property
+    def data(self) -> RunData:
+        """The run of the log, read on demand."""
+        if not self.log:
+            raise InputError("this run wrote no log, so its course is not known; give run(log=FILE), or use a Recorder")
+        from bilayer_core.log.run.log_reader import read_log
+
+        return read_log(self.log)
+
+    def plot(self, *quantities: str, **settings: Any) -> Any:
+        """Draw quantities of the log over time.
+
+        Parameters
+        ----------
+        *quantities : str
+        **settings
+            As of `Recorded.plot`.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+        """
+        return self.data.plot(*quantities, **settings)
+
+    def film(self, seconds: float | None = None, **look: Any) -> Any:
+        """Draw the run of the log as a film.
+
+        Parameters
+        ----------
+        seconds : float, optional
+        **look
+            As of `RunData.film`.
+
+        Returns
+        -------
+        Shown
+        """
+        return self.data.film(seconds, **look)
+
+    def _repr_html_(self) -> str:
+        """Return the result as a table for notebooks."""
+        rows: dict[str, object] = {"time": f"{self.time:g} s, of which {self.simulated:g} s in this run"}
+        rows |= {"steps": self.steps, "took": f"{self.wall_time:.3g} s"}
+        return html_table(f"Run {self.termination.value}", rows | ({"log": self.log} if self.log else {}))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +26,7 @@ from bilayer_core.model.state import State, initial_state, refuse_out_of_plane, 
 from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.observed.inputs import RESET, Input
 from bilayer_core.observed.observer import Observer
+from bilayer_core.printable import html_table
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.capture import make_frame
@@ -40,7 +43,8 @@ from bilayer_core.simulation.observation import (
 )
 from bilayer_core.simulation.plane_watch import PlaneWatch
 from bilayer_core.simulation.poses import LEAST_TIME
-from bilayer_core.simulation.run_loop import Callbacks, RunLoop
+from bilayer_core.simulation.progress_bar import progress_bar
+from bilayer_core.simulation.run_loop import Callbacks, RunLoop, time_left
 from bilayer_core.simulation.run_result import RunResult
 from bilayer_core.simulation.same_model import differing
 from bilayer_core.simulation.settling import SETTLE, settle, unstable_start
@@ -108,7 +112,7 @@ class Simulator:
         tolerance: float | None = None,
         budget: bool = False,
     ) -> None:
-        scene = scene if isinstance(scene, SceneConfig) else load_scene(scene)
+        scene = load_scene(scene)
         self.plan = make_plan(scene, model=model, dimension=dimension, integrator=integrator)
         method = INTEGRATORS[self.plan.integrator]
         self._asked_steps = dt, tolerance
@@ -129,7 +133,9 @@ class Simulator:
         self._controls = Controls(self._stepper, self._state)
         self._unsettled = scene.start == SETTLE
         self._loop = RunLoop(self._stepper, self._state, self._controls, self.plane_watch, self._settle)
-        self._present = Present(self._stepper, lambda: self._now, self._loop.compile)
+        self._present = Present(
+            self._stepper, lambda: self._now, self._loop.compile, lambda: self.description, self.frame
+        )
         self._note_start()
 
     def __repr__(self) -> str:
@@ -138,6 +144,39 @@ class Simulator:
             f"Simulator({self.scene.name} at t = {self.time:g} s: {self.plan.model} in {self.plan.dimension}-D, "
             f"{self.plan.integrator}, {len(self.model.strands)} strands, {dof} nodes, {len(self.bodies)} bodies)"
         )
+
+    def _repr_html_(self) -> str:
+        """Return the simulator as a table for notebooks."""
+        plan = f"{self.plan.model} in {self.plan.dimension}-D, {self.plan.integrator}"
+        counts = f"{len(self.rods)} rods, {self.model.node_count} nodes, {len(self.bodies)} bodies"
+        stimuli = ", ".join(f"{name} {channel.unit.strip('1')}".strip() for name, channel in self.scene.stimuli.items())
+        rows = {
+            "time": f"{self.time:g} of {self.scene.duration:g} s",
+            "robot": counts,
+            "solver": plan,
+            "stimuli": stimuli,
+        }
+        return html_table(f"{self.scene.name}: {self.scene.title}", rows)
+
+    def show(self, **look: Any) -> Any:
+        """Show the robot as it is now: in rerun, where `rerun-notebook` is installed, otherwise as a picture.
+
+        Parameters
+        ----------
+        **look
+            Of a picture: ``camera``, ``background``, ``colour``, ``size``, ``reactions``, as ``bilayer render``.
+
+        Returns
+        -------
+        object
+            A notebook shows it.
+        """
+        from bilayer_core.log.run.memory import MemoryRecorder
+
+        recorder = MemoryRecorder()
+        recorder.start(self.description)
+        recorder.observe(self.frame())
+        return recorder.run_data().show(**look)
 
     def _stepper_of(self, model: Model) -> Stepper:
         return Stepper(model, self._method, self.steps, self.scene.solver.max_newton_iterations)
@@ -490,9 +529,10 @@ class Simulator:
         until: float | None = None,
         stop: Callable[[], bool] | None = None,
         log: str | Path | None = None,
+        overwrite: bool = False,
         observers: Sequence[Observer] = (),
         inputs: Sequence[Input] = (),
-        progress: Callable[[float], None] | None = None,
+        progress: Callable[[float], None] | bool = False,
         each_step: Callable[[float], None] | None = None,
         interrupted: Callable[[], bool] | None = None,
     ) -> RunResult:
@@ -513,16 +553,19 @@ class Simulator:
             Asked after each step; true ends the run, as ``stopped``. Steps are then made one by one, which takes a
             little longer and changes none.
         log : str or Path, optional
-            MCAP file to write, at the rates of the scene's `output`; for others, or to replace a file, put a
+            MCAP file to write, at the rates of the scene's `output`; for others put a
             `bilayer_core.log.file.mcap_log.McapRecorder` among the observers.
+        overwrite : bool
+            Replace that file if it exists.
         observers : sequence of Observer
             Each sees the first frame, the last, and at its rate between that of the first step which ends at or after
             each due time; all are closed whatever happens. For those that look at more than one run see `attach`.
         inputs : sequence of Input
             What acts from outside (`observed.inputs`), each from its time on: adaptive steps end there, of fixed ones
             it acts from the first that begins then or later.
-        progress : callable, optional
-            Called every few steps with the simulated time [s].
+        progress : bool or callable
+            True shows a bar, in notebooks and on terminals. A function is called every few steps with the simulated
+            time [s].
         each_step : callable, optional
             Called with the simulated time [s] after each step, made one by one.
         interrupted : callable, optional
@@ -547,9 +590,14 @@ class Simulator:
             from bilayer_core.log.file.mcap_log import McapRecorder
 
             output = self.scene.output
-            observers = [McapRecorder(log, output.rate, output.marker_rate), *observers]
-        callbacks = Callbacks(stop, interrupted, progress, each_step)
-        return self._loop.run(self, duration, until, observers, inputs, callbacks)
+            observers = [McapRecorder(log, output.rate, output.marker_rate, overwrite), *observers]
+        with ExitStack() as bar:
+            if progress is True:
+                end = self.time + time_left(self.time, self.scene.duration, duration, until)
+                progress = bar.enter_context(progress_bar(self.scene.name, self.time, end))
+            callbacks = Callbacks(stop, interrupted, progress or None, each_step)
+            result = self._loop.run(self, duration, until, observers, inputs, callbacks)
+        return result if log is None else replace(result, log=str(log))
 
     def attach(self, observer: Observer) -> Callable[[], None]:
         """Show frames to an observer from now on, at its rate, whoever makes steps.
@@ -657,7 +705,7 @@ class Simulator:
             If its model is another, or somebody observes the run: a log is of one scene. Nothing is changed then.
         """
         if scene is not None:
-            self._take_scene(scene if isinstance(scene, SceneConfig) else load_scene(scene))
+            self._take_scene(load_scene(scene))
         self._controls.note(RESET, "")
         self._state.take(self._initial_state())
         self._unsettled = self.scene.start == SETTLE

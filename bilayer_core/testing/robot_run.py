@@ -184,9 +184,7 @@ def run_scene(
     BilayerError
         If the scene is not acceptable, or a step cannot be made.
     """
-    config = scene if isinstance(scene, SceneConfig) else load_scene(scene, overrides)
-    if isinstance(scene, SceneConfig) and overrides:
-        raise InputError("overrides: are for scenes that are loaded; this one is loaded already")
+    config = load_scene(scene, overrides)
     simulator = Simulator(config, **settings)
     simulator.compile()
     return RobotRun(simulator, drive, config.duration if duration is None else duration, rate)

@@ -18,6 +18,7 @@ from bilayer_core.errors import InputError
 from bilayer_core.extras import require
 from bilayer_core.log.file.output_paths import check_output_path, draft_of
 from bilayer_core.log.run.log_reader import read_log
+from bilayer_core.log.run.recorded import Recorded
 from bilayer_core.log.run.run_data import RunData
 from bilayer_core.log.run.tables import chosen_names, component_unit
 
@@ -75,16 +76,16 @@ class Line:
     values: np.ndarray
 
 
-def lines_of(run: RunData, number: int, wanted: Sequence[str], node: int | None = None) -> list[Line]:
+def lines_of(run: Recorded, number: int, wanted: Sequence[str], node: int | None = None) -> list[Line]:
     """Return the curves of some quantities of a run.
 
     Parameters
     ----------
-    run : RunData
+    run : Recorded
     number : int
         Of the run, among those that are drawn.
     wanted : sequence of str
-        Names such as ``com``, ``com.z``, ``energy/*`` or ``rod/strip/laminate/position.z``.
+        Names such as ``com``, ``com.z``, ``energy/*`` or ``rod/strip/position.z``.
     node : int, optional
         Which node of a rod, from the end if negative; by default the last one.
 
@@ -308,7 +309,7 @@ def _run(log: str | Path) -> RunData:
     return run
 
 
-def _split(asked: str, run: RunData) -> tuple[str, str]:
+def _split(asked: str, run: Recorded) -> tuple[str, str]:
     """Return the name and component of what is asked for."""
     if asked in run.entries():
         return asked, ""

@@ -12,6 +12,7 @@ import numpy as np
 from bilayer_core.errors import InputError
 from bilayer_core.extras import require
 from bilayer_core.log.run.log_reader import read_log
+from bilayer_core.log.run.run_data import RunData
 from bilayer_core.view.arrows import contact_arrows, reaction_arrows
 from bilayer_core.view.camera import AUTO, HALF_SLOPE, Camera, Insets, Shot, parse_camera, shots
 from bilayer_core.view.colouring import STRAIN, choose_colouring
@@ -66,12 +67,12 @@ class Look:
 
 
 class Studio:
-    """A log, for as many pictures as are wanted.
+    """A run, for as many pictures as are wanted.
 
     Parameters
     ----------
-    path : str or Path
-        MCAP log.
+    run : RunData, str or Path
+        A run, or the MCAP log of one.
     look : Look
 
     Raises
@@ -80,11 +81,11 @@ class Studio:
         The log cannot be read or holds no frame, or VTK or an OpenGL driver is missing.
     """
 
-    def __init__(self, path: str | Path, look: Look):
+    def __init__(self, run: RunData | str | Path, look: Look):
         require_vtk()
-        self._path, self._look = Path(path), look
-        self._run = run = read_log(path)
-        refuse_undrawable(run, str(path))
+        path, run = (run.description.scene_name, run) if isinstance(run, RunData) else (str(run), read_log(run))
+        self._path, self._look, self._run = path, look, run
+        refuse_undrawable(run, path)
         if not all(map(has_sections, run.description.layers)):
             raise InputError(
                 f"{path}: does not hold the node's description, so the widths of its rods are not known; "

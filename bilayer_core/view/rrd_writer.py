@@ -58,17 +58,22 @@ def write_recording(run: RunData, rrd_path: str | Path, colour: str = STRAIN) ->
     colour : str
         What the colours of rods say, from `colouring.QUANTITIES`.
     """
-    refuse_undrawable(run, run.description.scene_name)
-    scales, colouring = choose_scales(run), choose_colouring(run, colour)
     recording = rr.RecordingStream("bilayer_sim")
     memory = recording.memory_recording()  # rerun's own writer ends well where it has lost the end of a file
+    send_run(recording, run, colour)
+    Path(rrd_path).write_bytes(memory.drain_as_bytes())
+    recording.disconnect()
+
+
+def send_run(recording: rr.RecordingStream, run: RunData, colour: str = STRAIN) -> None:
+    """Send a whole run and its layout to a recording; InputError if it holds no frame."""
+    refuse_undrawable(run, run.description.scene_name)
+    scales, colouring = choose_scales(run), choose_colouring(run, colour)
     recording.send_blueprint(blueprint(run, scales, colouring))  # active: rerun's page ignores one that is not
     sender = RunSender(recording, run.description)
     sender.begin(scales)
     sender.explain(summary(run, scales, colouring), colouring)
     sender.send(run, scales, colouring, reaction_arrows(run, scales))
-    Path(rrd_path).write_bytes(memory.drain_as_bytes())
-    recording.disconnect()
 
 
 class RunSender:

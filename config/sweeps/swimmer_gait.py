@@ -23,5 +23,5 @@ def speed(run):
 
 def tip_distance(run):
     """Return the least distance of the end of an arm from the axis during the run [mm]."""
-    tip = run.recording["rod/arm_0/laminate/position"].values[:, -1]
+    tip = run.recording["rod/arm_0/position"].values[:, -1]
     return 1e3 * float(np.hypot(tip[:, 0], tip[:, 1]).min())

@@ -34,7 +34,7 @@ ACCEPTED = (0.93, 0.97)
 """Share of intervals that cover the truth."""
 TIMES = np.round(0.04 * np.arange(1, 9), 10)
 """[s]"""
-TIP = "rod/strip/laminate/position[-1]"
+TIP = "rod/strip/position[-1]"
 TRUTH = {"materials.gel.youngs_modulus": 1e6, "rods.strip.layers.active.eigenstrain.gain": 0.04}
 PARAMETERS = {
     "materials.gel.youngs_modulus": ("0.1 MPa", "10 MPa", "0.6 MPa"),

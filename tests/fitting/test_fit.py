@@ -118,11 +118,11 @@ def test_a_parameter_at_its_bound_has_no_interval_and_is_named(noisy):
     assert found[MODULUS].interval is not None
     assert np.isnan(found.correlations[1]).all() and found.correlations[0, 0] == 1.0
     assert any(f"{GAIN} ends at its upper bound" in warning for warning in found.warnings)
-    assert "no interval" in repr(found)
+    assert "no interval" in repr(found) and "no interval" in found._repr_html_()
 
 
 def test_curvature_and_forces_are_data_too():
-    names = ["rod/strip/laminate/curvature[5]", "body/wall/clamp_wrench.my"]
+    names = ["rod/strip/curvature[5]", "body/wall/clamp_wrench.my"]
     columns = data_of(load_scene(SCENE), 0.04 * np.arange(1, 9), names)
     sigma = {names[0]: 0.1, names[1]: "1 mN*mm"}
     assert fit(SCENE, columns, PARAMETERS, sigma=sigma).values == pytest.approx(TRUTH, rel=1e-6)

@@ -8,11 +8,12 @@ import pytest
 from support import synthetic_run
 
 import bilayer_core
-from bilayer_core import Simulator, compare, load_scene, read_log
+from bilayer_core import Recorder, Simulator, compare, load_scene, read_log
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError
 from bilayer_core.forces.force_register import TERMS
 from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.run.quantities import entries
 from bilayer_core.log.run.run_data import RunData
 
 TIMES = np.arange(0, 26) * 0.02
@@ -173,3 +174,62 @@ def test_every_term_of_energy_has_a_name_that_logs_are_read_with(tmp_path):
     recorder.observe(frame)
     recorder.close(True)
     assert list(read_log(tmp_path / "run.mcap").energy) == list(terms)
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory):
+    """Logs of one strip, with layers of unlike thickness of which one ends early, in both models."""
+    directory = tmp_path_factory.mktemp("both")
+    over = {"rods.strip.layers.0.thickness": 0.3e-3, "rods.strip.layers.1.interval": [0.0, 0.08]}
+    found = {}
+    for model in ("two_rod", "laminate"):
+        simulator = Simulator(load_scene("bending", over), model=model)
+        simulator.set_stimulus("swelling", 0.5)
+        simulator.solve_static()
+        simulator.run(0.01, log=directory / f"{model}.mcap")
+        found[model] = simulator, read_log(directory / f"{model}.mcap")
+    return found
+
+
+def test_a_rod_has_the_same_rows_under_the_same_names_in_both_models(both):
+    (two, of_two), (one, of_one) = both.values()
+    names = [name for name in of_one.quantities if name.startswith("rod/")]
+    assert set(names) <= set(of_two.quantities) and len(names) == 9
+    curve = one.rods["strip"].positions
+    for name, apart in (("rod/strip/position", 1e-5), ("rod/strip/strain", 2e-5), ("rod/strip/active/position", 1e-5)):
+        values = of_two[name].values[-1], of_one[name].values[-1]
+        assert values[0].shape == values[1].shape
+        elsewhere = np.arange(len(values[0])) != (32 if "strain" in name else -1)  # where the layer ends, means differ
+        np.testing.assert_allclose(*(found[elsewhere] for found in values), atol=apart)
+    for simulator, run in both.values():
+        middle = simulator.rods["strip"].middle_line
+        assert middle.shape == curve.shape == (41, 3)
+        np.testing.assert_allclose(run["rod/strip/position"].values[-1], middle, atol=1e-8)
+    assert np.abs(of_one["rod/strip/position"].values[-1] - curve).max() > 1e-4  # where nodes are does not matter
+
+
+def test_frames_and_forces_of_two_layers_are_those_of_the_rod(both):
+    _, run = both["two_rod"]
+    frames = run["rod/strip/frame"].values[-1]
+    np.testing.assert_allclose(np.linalg.norm(frames, axis=-1), 1.0, atol=1e-6)
+    np.testing.assert_allclose(frames, both["laminate"][1]["rod/strip/frame"].values[-1], atol=5e-3)
+    np.testing.assert_array_equal(frames[-5:], run["rod/strip/passive/frame"].values[-1][-5:])
+    assert run["rod/strip/contact_force"].values.shape == (*run["rod/strip/curvature"].values.shape, 3)
+
+
+def test_the_names_of_older_versions_are_read_with_a_warning(both):
+    _, run = both["laminate"]
+    with pytest.warns(FutureWarning, match="'rod/strip/laminate/position' is now 'rod/strip/position'"):
+        found = run["rod/strip/laminate/position"]
+    np.testing.assert_array_equal(found.values, run["rod/strip/position"].values)
+    with pytest.warns(FutureWarning, match=r"is now 'rod/strip/\*'"):
+        Recorder(both["laminate"][0], "rod/strip/laminate/*").stop()
+    with pytest.raises(InputError, match="there is none; near it"), pytest.warns(FutureWarning):
+        run["rod/strap/laminate/position"]
+
+
+def test_an_older_log_of_two_layers_lacks_the_rod_of_both():
+    model = synthetic_run.description()
+    older = replace(model, strands=tuple(replace(strand, first_station=None) for strand in model.strands))
+    names = {entry.name for entry in entries(older, (), ())}
+    assert "rod/arm_0/position" not in names and "rod/arm_0/active/position" in names

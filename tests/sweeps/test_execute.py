@@ -106,11 +106,11 @@ def test_functions_see_simulator_summary_parameters_and_what_was_recorded(strip)
 
 
 def test_metrics_of_quantities_take_what_they_say(strip):
-    of = "rod/strip/laminate/position.z"
+    of = "rod/strip/position.z"
     for take in ("first", "last", "min", "max", "mean", "range", "largest_magnitude"):
         strip["metrics"][take] = {"quantity": of, "node": -1, "take": take}
     strip["metrics"]["late"] = {"quantity": of, "node": -1, "take": "range", "after": "0.3 s"}
-    strip["record"] = {"quantities": ["rod/strip/laminate/position"], "rate": 100}
+    strip["record"] = {"quantities": ["rod/strip/position"], "rate": 100}
     kept = []
     row = rows(strip, functions={"keep": lambda run: kept.append(run.recording[of[:-2]].values[:, -1, 2])})[0]
     z, found = kept[0], row.metrics

@@ -83,7 +83,7 @@ def test_what_a_sweep_file_cannot_say_is_told_with_its_key(strip, path, value, t
         ("metrics/height/quantity", "con.z", "near it: com"),
         ("metrics/height/quantity", "rod/strip/active/curvature", "sweep: quantity 'rod/strip/active/curvature'"),
         ("metrics/height/quantity", "com", "take one of com.x, com.y, com.z"),
-        ("metrics/height/quantity", "rod/strip/laminate/curvature", "`node` must say which, 0 to 40"),
+        ("metrics/height/quantity", "rod/strip/curvature", "`node` must say which, 0 to 40"),
         ("metrics/height", {"function": "math:sqrt"}, "math is no .py file; must be FILE.py:NAME"),
         ("metrics/height", {"function": "absent.py:grip"}, "metrics.height: found 'absent.py:grip'"),
         ("parameters/length/values", ["-80 mm", "-100 mm"], "must have an acceptable scene"),

@@ -15,6 +15,7 @@ import bilayer_core
 from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_core.observed.observer import Observer
 from bilayer_core.runs.replay import branch
+from bilayer_core.scene import scene_classes
 from bilayer_core.studies.converge.study import converge
 from bilayer_core.testing import run_scene
 
@@ -38,9 +39,9 @@ VERBS = frozenset(
     """.split()
 )
 """First words of docstrings of functions; another verb is added here."""
-CALLED = [getattr(bilayer_core, name) for name in bilayer_core.__all__ if name != "__version__"]
+CALLED = [getattr(bilayer_core, name) for name in set(bilayer_core.__all__) - {"__version__", *scene_classes.__all__}]
 CALLED += [run_scene, McapRecorder, branch, converge]
-"""Functions and classes that programs of users call."""
+"""Functions and classes that programs of users call; the tables of keys document the classes of scenes."""
 CODES = {"PR01", "PR02", "PR03", "RT01", "YD01"}
 """Codes of numpydoc: parameters are documented, under their names and in order; so are returned and yielded values."""
 

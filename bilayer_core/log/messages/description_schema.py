@@ -72,7 +72,7 @@ class ShapePart(Part):
 
 
 class StrandPart(Part):
-    """A `Strand`; older logs have neither offset nor curvature nor layers nor closed ones."""
+    """A `Strand`; older logs have neither offset nor curvature nor layers nor closed ones, nor the first station."""
 
     name: PathName
     rod: Name
@@ -87,6 +87,7 @@ class StrandPart(Part):
     closed: StrictBool = False
     round: StrictBool = False
     strip: StrictBool = False
+    first_station: Count | None = None
 
     @model_validator(mode="after")
     def _check_sizes(self) -> Self:

@@ -247,8 +247,7 @@ class LogSource:
         for entry in wanted:
             if entry.name not in found:  # not a single row
                 topic = self._topics.get(entry.topic)
-                shape = np.empty(topic.shape)[entry.columns].shape if topic else ()
-                found[entry.name] = np.empty((0, *shape))
+                found[entry.name] = entry.taken(np.empty((0, *topic.shape)), entry.columns) if topic else np.empty(0)
         return found
 
     def _shapes(self) -> dict[str, object]:
@@ -364,5 +363,5 @@ def _taken(queues: Iterable[_Queue], rows: int) -> dict[str, Array]:
         whole = queue.topic.stack(queue.messages[:rows])
         del queue.messages[:rows]
         for entry in queue.wanted:
-            found[entry.name] = whole[(slice(None), *entry.columns)]
+            found[entry.name] = entry.taken(whole, entry.columns)
     return found

@@ -11,20 +11,26 @@ name                               axes after time                is
 ``body/<body>/quaternion``         part                           x y z w
 ``body/<body>/contact_wrench``     part                           force [N] and moment [N m] of contact
 ``body/<body>/clamp_wrench``       part                           of the rods that it holds
-``rod/<strand>/position``          node, axis                     [m]
-``rod/<strand>/contact_force``     node, axis                     [N]
-``rod/<strand>/frame``             node, part                     quaternion x y z w of the axes m1 m2 m3
-``rod/<strand>/strain``            node                           axial
-``rod/<strand>/curvature``         node                           through the thickness [1/m]
-``rod/<strand>/section_curvature`` node                           of a strip across its width, in the mean [1/m]
+``rod/<rod>/position``             node, axis                     the rod's middle line: midway between its faces [m]
+``rod/<rod>/contact_force``        node, axis                     [N]
+``rod/<rod>/frame``                node, part                     quaternion x y z w of the axes m1 m2 m3
+``rod/<rod>/strain``               node                           axial, in the middle line
+``rod/<rod>/curvature``            node                           through the thickness [1/m]
+``rod/<rod>/section_curvature``    node                           of a strip across its width, in the mean [1/m]
+``rod/<rod>/<layer>/position``     node, axis                     the middle of a layer [m]
+``rod/<rod>/<layer>/strain``       node                           axial, there
 ================================== ============================== =====================================================
 
-A strand is ``<rod>/<layer>``. What stands under ``rod/`` comes at the rate of markers, all else at that of frames.
+Quantities of rods have a row for each station in both models. The model ``two_rod`` also has ``contact_force``,
+``frame`` and ``curvature`` of each layer, and its rods have the weighted mean of their layers, or the sum of forces.
+What stands under ``rod/`` comes at the rate of markers, all else at that of frames.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import re
+import warnings
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any, Protocol
@@ -34,7 +40,8 @@ import numpy as np
 from bilayer_core.errors import InputError
 from bilayer_core.log.messages.node_frames import node_order
 from bilayer_core.log.messages.topics import SECTION_POINTS
-from bilayer_core.observed.frame import Description
+from bilayer_core.log.run.middle_line import LayerMiddle, RodMiddle
+from bilayer_core.observed.frame import Description, Strand
 
 Array = np.ndarray
 AXES, QUATERNION, WRENCH = ("x", "y", "z"), ("x", "y", "z", "w"), ("fx", "fy", "fz", "mx", "my", "mz")
@@ -107,6 +114,8 @@ class Entry:
         That holds it in a log, by its name in `log.messages.topics`.
     columns : tuple
         Index into the array of one message.
+    derive : callable or None
+        Makes the values from those that the index or the columns pick, whatever axes come before theirs.
     """
 
     name: str
@@ -117,6 +126,7 @@ class Entry:
     columns: tuple[Any, ...]
     axes: tuple[str, ...] = ()
     labels: tuple[str, ...] = ()
+    derive: Callable[[Array], Array] | None = None
 
     @property
     def of_shape(self) -> bool:
@@ -135,8 +145,26 @@ class Entry:
         Quantity
         """
         held = getattr(run, self.attribute)
-        values = held[self.index] if isinstance(held, dict) else held[(slice(None), *self.index)]
+        values = held[self.index] if isinstance(held, dict) else self.taken(held, tuple(self.index))
         return self.filled(run.shape_times if self.of_shape else run.times, values)
+
+    def taken(self, held: Array, index: tuple[Any, ...]) -> Array:
+        """Return the values of the quantity in rows of an array.
+
+        Parameters
+        ----------
+        held : ndarray
+            The attribute of a run, or messages of the topic, shape (rows, ...).
+        index : tuple
+            Into each row: `index` or `columns`.
+
+        Returns
+        -------
+        ndarray
+            Shape (rows, ...), of the type of `held`.
+        """
+        values: Array = held[(slice(None), *index)]
+        return values if self.derive is None else self.derive(values).astype(values.dtype, copy=False)
 
     def filled(self, times: Array, values: Array) -> Quantity:
         """Return the quantity with its values.
@@ -172,24 +200,85 @@ def entries(description: Description, terms: Iterable[str], figures: Iterable[st
             topic = f"{kind}_wrench/{body.name}"
             yield Entry(f"{of}/{kind}_wrench", "N, N m", f"{kind}_wrenches", (k,), topic, (), ("part",), WRENCH)
     row_of = {int(node): k for k, node in enumerate(node_order(description))}
+    rods: dict[str, list[Strand]] = {}
     for strand in description.strands:
-        of, nodes = f"rod/{strand.name}", strand.nodes
-        frames = [row_of[node] for node in range(nodes.start, nodes.stop)]
-        of_axis, of_part = (("node", "axis"), AXES), (("node", "part"), QUATERNION)
-        yield Entry(f"{of}/position", "m", "positions", (nodes,), "points", (nodes, slice(0, 3)), *of_axis)
-        yield Entry(f"{of}/contact_force", "N", "contact_forces", (nodes,), "points", (nodes, slice(5, 8)), *of_axis)
-        yield Entry(f"{of}/frame", "", "material_frames", (frames,), "nodes", (frames, slice(3, 7)), *of_part)
-        yield Entry(f"{of}/strain", "", "strain", (nodes,), "points", (nodes, 3), ("node",))
-        yield Entry(f"{of}/curvature", "1/m", "curvature", (nodes,), "points", (nodes, 4), ("node",))
-        if strand.strip:
-            across = f"{of}/section_curvature"
-            yield Entry(across, "1/m", "section_curvature", (nodes,), SECTION_POINTS.name, (nodes, 3), ("node",))
+        rods.setdefault(strand.rod, []).append(strand)
+    for name, strands in rods.items():
+        if len(strands) == 1:
+            yield from _of_strand(f"rod/{name}", strands[0], row_of)
+            for layer in strands[0].layers:
+                yield from _in_the_middle(f"rod/{layer.name}", layer, row_of)
+        elif all(strand.first_station is not None for strand in strands):  # else of an older log
+            yield from _of_both(f"rod/{name}", strands, row_of)
+        for strand in strands:
+            if not strand.layers:
+                yield from _of_strand(f"rod/{strand.name}", strand, row_of)
+
+
+_OF_AXIS, _OF_PART, _OF_NODE = (("node", "axis"), AXES), (("node", "part"), QUATERNION), (("node",), ())
+
+
+def _of_strand(of: str, strand: Strand, row_of: dict[int, int]) -> Iterator[Entry]:
+    nodes, frames = strand.nodes, _rows(strand, row_of)
+    yield from _in_the_middle(of, strand, row_of)
+    yield Entry(f"{of}/contact_force", "N", "contact_forces", (nodes,), "points", (nodes, slice(5, 8)), *_OF_AXIS)
+    yield Entry(f"{of}/frame", "", "material_frames", (frames,), "nodes", (frames, slice(3, 7)), *_OF_PART)
+    yield Entry(f"{of}/curvature", "1/m", "curvature", (nodes,), "points", (nodes, 4), *_OF_NODE)
+    if strand.strip:
+        across = f"{of}/section_curvature"
+        yield Entry(across, "1/m", "section_curvature", (nodes,), SECTION_POINTS.name, (nodes, 3), *_OF_NODE)
+
+
+def _in_the_middle(of: str, part: Strand, row_of: dict[int, int]) -> Iterator[Entry]:
+    """Yield position and strain in the middle of a strand, or of a layer of one."""
+    nodes, middle = part.nodes, LayerMiddle(part)
+    if not part.offset.any():
+        yield Entry(f"{of}/position", "m", "positions", (nodes,), "points", (nodes, slice(0, 3)), *_OF_AXIS)
+        yield Entry(f"{of}/strain", "", "strain", (nodes,), "points", (nodes, 3), *_OF_NODE)
+        return
+    yield _derived(f"{of}/position", "m", "nodes", (_rows(part, row_of),), _OF_AXIS, middle.positions)
+    yield _derived(f"{of}/strain", "", "points", (nodes, slice(3, 5)), _OF_NODE, middle.strain)
+
+
+def _of_both(of: str, strands: list[Strand], row_of: dict[int, int]) -> Iterator[Entry]:
+    """Yield the quantities of a rod of two strands."""
+    nodes = np.concatenate([np.arange(strand.nodes.start, strand.nodes.stop) for strand in strands])
+    frames, middle = [row for strand in strands for row in _rows(strand, row_of)], RodMiddle(strands)
+    for name, unit, columns, kind, derive in (
+        ("position", "m", slice(0, 3), _OF_AXIS, middle.mean),
+        ("strain", "", 3, _OF_NODE, middle.mean),
+        ("contact_force", "N", slice(5, 8), _OF_AXIS, middle.total),
+        ("curvature", "1/m", 4, _OF_NODE, middle.mean),
+    ):
+        yield _derived(f"{of}/{name}", unit, "points", (nodes, columns), kind, derive)
+    yield _derived(f"{of}/frame", "", "nodes", (frames, slice(3, 7)), _OF_PART, middle.frame)
+
+
+def _derived(
+    name: str, unit: str, topic: str, columns: tuple[Any, ...], kind: tuple[Any, Any], derive: Callable[[Array], Array]
+) -> Entry:
+    """Return an entry of values that are not in a topic, but come of some there; runs have an array of its name."""
+    return Entry(name, unit, topic, columns, topic, columns, *kind, derive)
+
+
+def _rows(strand: Strand, row_of: dict[int, int]) -> list[int]:
+    """Return where the nodes of a strand are in the topic ``nodes``."""
+    return [row_of[node] for node in range(strand.nodes.start, strand.nodes.stop)]
 
 
 def quantities_of(run: Run) -> Iterator[Quantity]:
     """Yield all quantities of a run."""
     for entry in entries(run.description, run.energy, run.solver):
         yield entry.of(run)
+
+
+def present_name(name: str, known: Collection[str]) -> str:
+    """Return the present name of a quantity or a pattern; one that older versions had is told in a warning."""
+    new = re.sub("^(rod/[^/]+)/laminate/", r"\1/", name)
+    if new == name or name in known:
+        return name
+    warnings.warn(f"quantity {name!r} is now {new!r}, in the rod's middle line", FutureWarning, stacklevel=3)
+    return new
 
 
 def unknown_quantity(name: str, known: Iterable[str], reason: str | None = None) -> InputError:

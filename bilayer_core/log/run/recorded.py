@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bilayer_core.extras import require
-from bilayer_core.log.run.quantities import AXES, Entry, Quantity, unknown_quantity
+from bilayer_core.extras import of_notebook, require
+from bilayer_core.log.run.quantities import AXES, Entry, Quantity, present_name, unknown_quantity
 from bilayer_core.observed.frame import Description
+from bilayer_core.printable import html_table
 
 if TYPE_CHECKING:
     import pandas
@@ -79,6 +80,7 @@ class Recorded(ABC):
             If there is none; the message has the nearest names.
         """
         known = self.quantities
+        name = present_name(name, known)
         if name not in known:
             raise unknown_quantity(name, known, self.why_not(name))
         return known[name]
@@ -100,6 +102,39 @@ class Recorded(ABC):
         if wanted:
             found = {entry.name: self.quantities[entry.name].values for entry in wanted}
             yield slice(0, len(found[wanted[0].name])), found
+
+    def plot(self, *quantities: str, node: int | None = None, width: str | float = "single") -> Any:
+        """Draw quantities over time, those of one unit in a panel; needs matplotlib.
+
+        Parameters
+        ----------
+        *quantities : str
+            Names or patterns, with a component or without: ``com.z``, ``energy/*``.
+        node : int, optional
+            Station of a rod; by default the last one.
+        width : str or float
+            ``single`` or ``double`` column, or a width [mm].
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        InputError
+            If there is no such quantity, component or node.
+        """
+        return of_notebook("plot")(self, quantities, node, width)
+
+    def _repr_html_(self) -> str:
+        """Return the run as a table for notebooks."""
+        units = {name: f"{entry.unit or '1'}" for name, entry in self.entries().items()}
+        groups: dict[str, list[str]] = {}
+        for name, unit in units.items():
+            groups.setdefault(name.rpartition("/")[0] or name, []).append(f"{name.rpartition('/')[2]} [{unit}]")
+        span = f"{self.times[0]:g} to {self.times[-1]:g} s, {len(self.times)} frames" if self.times.size else "empty"
+        rows = {"time": span} | {name: ", ".join(held) for name, held in groups.items()}
+        return html_table(f"{type(self).__name__.removeprefix('Logged')} of {self.description.scene_name}", rows)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return all but shapes of rods as columns over time, such as ``body/ball/position.z``; needs pandas.

@@ -10,7 +10,7 @@ import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.log.messages.encoders import SOLVER_LABELS
-from bilayer_core.log.messages.node_frames import NodeFrames
+from bilayer_core.log.run.frame_values import FrameValues
 from bilayer_core.log.run.quantities import Entry, Quantity, entries
 from bilayer_core.log.run.recorded import Recorded
 from bilayer_core.log.run.tables import chosen_names
@@ -67,7 +67,7 @@ class Recorder(Recorded):
         asked = [quantities] if isinstance(quantities, str) else list(quantities)
         names = [name for one in asked for name in chosen_names(known, one, lambda _: None)] if asked else list(known)
         self._entries = {name: known[name] for name in names}
-        self._node_frames = NodeFrames(self.description) if any(map(_is_frame, self._entries.values())) else None
+        self._in_frames = FrameValues(self.description)
         self._times: list[float] = []
         self._values: dict[str, list[Array]] = {name: [] for name in self._entries}
         self._detach = simulator.attach(self)
@@ -110,11 +110,9 @@ class Recorder(Recorded):
         del self._times[kept:]
         for values in self._values.values():
             del values[kept:]
-        if self._node_frames is not None:
-            self._node_frames.update(frame)
         self._times.append(frame.time)
-        for name, entry in self._entries.items():
-            self._values[name].append(self._value(entry, frame))
+        for name, entry in self._entries.items():  # those of nodes in single precision, as in logs
+            self._values[name].append(self._in_frames.of(entry, frame, np.float32 if entry.of_shape else float))
 
     def close(self, complete: bool, termination: str = "") -> None:
         """End the recording. The simulator calls this when the recorder is detached.
@@ -126,18 +124,6 @@ class Recorder(Recorded):
         termination : str
             Why it ended.
         """
-
-    def _value(self, entry: Entry, frame: Frame) -> Array:
-        """Return a copy of a quantity in a frame; quantities of nodes have single precision, as in logs."""
-        if entry.attribute == "energy":
-            return np.array(frame.energy[str(entry.index)])
-        if entry.attribute == "solver":
-            return np.array(float(getattr(frame, str(entry.index))))
-        if _is_frame(entry) and self._node_frames is not None:
-            frames: Array = self._node_frames.quaternions
-            return frames[entry.index].astype(np.float32)
-        values: Array = getattr(frame, entry.attribute)[entry.index]
-        return np.array(values, np.float32 if entry.of_shape else float)
 
     # what was recorded
 
@@ -165,7 +151,3 @@ class Recorder(Recorded):
         dict of str to Entry
         """
         return dict(self._entries)
-
-
-def _is_frame(entry: Entry) -> bool:
-    return entry.attribute == "material_frames"

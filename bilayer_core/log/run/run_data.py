@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from bilayer_core.extras import of_notebook
 from bilayer_core.log.messages.events import Event
+from bilayer_core.log.messages.node_frames import node_order
+from bilayer_core.log.run.frame_values import joined
 from bilayer_core.log.run.quantities import Entry, Quantity, entries, quantities_of
 from bilayer_core.log.run.recorded import Recorded
 from bilayer_core.observed.frame import Description, Strand
@@ -94,6 +98,48 @@ class RunData(Recorded):
             f"RunData({self.description.scene_name}: {span}, {len(self.times)} frames, {len(self.shape_times)} shapes, "
             f"{len(self.quantities)} quantities: {names}, …)"
         )
+
+    @property
+    def points(self) -> np.ndarray:
+        """Position, strain, curvature and contact force of every node, shape (shapes, node_count, 8)."""
+        return joined(self.positions, self.strain[..., None], self.curvature[..., None], self.contact_forces)
+
+    @property
+    def nodes(self) -> np.ndarray:
+        """Positions and material frames of the nodes of strands, shape (shapes, strand nodes, 7)."""
+        return joined(self.positions[:, node_order(self.description)], self.material_frames)
+
+    def film(self, seconds: float | None = None, **look: Any) -> Any:
+        """Draw the run as a film without a screen; needs VTK and pillow.
+
+        Parameters
+        ----------
+        seconds : float, optional
+            How long it lasts; by default as long as the run, and 2 to 8 s.
+        **look
+            ``camera``, ``background``, ``colour``, ``size``, ``reactions``: words of ``bilayer render``.
+
+        Returns
+        -------
+        Shown
+            Notebooks play it; ``save(path)`` writes it, as WebP.
+        """
+        return of_notebook("film")(self, seconds, look)
+
+    def show(self, **look: Any) -> Any:
+        """Show the run in space: in rerun, where `rerun-notebook` is installed, otherwise as a picture of its end.
+
+        Parameters
+        ----------
+        **look
+            As of `film`.
+
+        Returns
+        -------
+        object
+            A notebook shows it.
+        """
+        return of_notebook("show")(self, look)
 
     def strain_of(self, layer: Strand) -> np.ndarray:
         """Return the axial strain in the middle of a layer.

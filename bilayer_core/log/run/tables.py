@@ -9,7 +9,7 @@ import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.log.run.log_source import SHAPE_TIME, TIME, LogSource
-from bilayer_core.log.run.quantities import Entry, unknown_quantity
+from bilayer_core.log.run.quantities import Entry, present_name, unknown_quantity
 
 Array = np.ndarray
 Column = tuple[str, str]
@@ -45,6 +45,7 @@ def chosen_names(known: Iterable[str], name: str, why_not: Callable[[str], str |
         Why a name that other logs have is not known here, if that is so.
     """
     known = list(known)
+    name = present_name(name, known)
     if name in known:
         return [name]
     matching = [one for one in known if fnmatchcase(one, name)] if PATTERN & set(name) else []

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from difflib import get_close_matches
+from functools import cached_property
 from typing import TypeVar
 
+import numpy as np
+
 from bilayer_core.errors import UnknownName
+from bilayer_core.log.run.frame_values import FrameValues
+from bilayer_core.log.run.quantities import Entry, entries
 from bilayer_core.model.model import Model
 from bilayer_core.model.state import State
+from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.simulation.parts import Parts
 from bilayer_core.simulation.stepper import Stepper
 
@@ -27,10 +33,22 @@ class Present:
         Returns the state, once it is what the scene starts with.
     ready : callable
         Has kernels and the forces of the first state ready.
+    description : callable
+        Returns the description of the run.
+    frame : callable
+        Returns a snapshot.
     """
 
-    def __init__(self, stepper: Stepper, started: Callable[[], State], ready: Callable[[], object]) -> None:
+    def __init__(
+        self,
+        stepper: Stepper,
+        started: Callable[[], State],
+        ready: Callable[[], object],
+        description: Callable[[], Description],
+        frame: Callable[[], Frame],
+    ) -> None:
         self._stepper, self._started, self._ready = stepper, started, ready
+        self._description, self._frame = description, frame
 
     @property
     def state(self) -> State:
@@ -47,6 +65,16 @@ class Present:
         self._ready()
         self._stepper.engine.evaluate_end()
         return self._stepper
+
+    def quantity(self, name: str) -> np.ndarray:
+        """Return a quantity of a rod, by its name in logs (`log.run.quantities`)."""
+        known, values = self._of_rods
+        return values.of(known[name], self._frame())
+
+    @cached_property
+    def _of_rods(self) -> tuple[dict[str, Entry], FrameValues]:
+        description = self._description()
+        return {entry.name: entry for entry in entries(description, (), ())}, FrameValues(description)
 
     def seen(self) -> Parts:
         """Return all observables of the present state."""

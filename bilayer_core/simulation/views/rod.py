@@ -18,7 +18,7 @@ class RodView:
     """A rod as it is at present; every attribute is a copy.
 
     A rod of the laminate is one curve. Where each layer is a rod of its own (model ``two_rod``), arrays hold their
-    nodes layer by layer, as those of the simulator do; what does not depend on the model is in `layers`.
+    nodes layer by layer, as those of the simulator do; what does not depend on the model is `middle_line` and `layers`.
 
     Attributes
     ----------
@@ -27,6 +27,8 @@ class RodView:
         Indices in the arrays of the simulator and of frames, shape (nodes,), (edges,).
     arc_length : Array
         Of each node from the start of its curve, without load and eigenstrain [m], shape (nodes,).
+    middle_line : Array
+        Positions midway between the faces of the rod [m], a row for each station in both models, shape (stations, 3).
     positions, velocities : Array
         [m], [m/s], shape (nodes, 3).
     directors : Array
@@ -48,7 +50,7 @@ class RodView:
         self._present, self.name, self._strands = present, name, strands
 
     def __repr__(self) -> str:
-        layers, tip = ", ".join(self.layers), self.positions[-1].tolist()
+        layers, tip = ", ".join(self.layers), self.middle_line[-1].tolist()
         return f"rod {self.name} (layers {layers}): {len(self.nodes)} nodes, the last at {tip}"
 
     @property
@@ -64,6 +66,10 @@ class RodView:
         rest = self._present.model.rods.rest_length
         lengths = [rest[s.first_edge : s.first_edge + s.shown - 1] for s in self._strands]
         return np.concatenate([np.concatenate([[0.0], np.cumsum(of_strand)]) for of_strand in lengths])
+
+    @property
+    def middle_line(self) -> Array:
+        return self._present.quantity(f"rod/{self.name}/position")
 
     @property
     def positions(self) -> Array:

@@ -1,8 +1,8 @@
 """Measured data of a fit: quantities of a run at some times, from a csv file or from arrays.
 
 A column is named as `log.run.quantities` names its quantity, with the component and the node where it has several, and
-perhaps a unit: ``com.z [mm]``, ``body/wall/clamp_wrench.fx``, ``rod/strip/laminate/position[-1].x [mm]``,
-``rod/strip/laminate/curvature[20]``. Nodes count from 0 at the start of the rod, and from −1 at its end. The column
+perhaps a unit: ``com.z [mm]``, ``body/wall/clamp_wrench.fx``, ``rod/strip/position[-1].x [mm]``,
+``rod/strip/curvature[20]``. Nodes count from 0 at the start of the rod, and from −1 at its end. The column
 ``time`` is in seconds unless it says otherwise. A column ``com.z.sigma`` has the standard deviations of ``com.z``.
 Empty cells (NaN in arrays) are data that are missing.
 """
@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from bilayer_core.errors import InputError
-from bilayer_core.log.run.quantities import Entry, unknown_quantity
+from bilayer_core.log.run.quantities import QUATERNION, Entry, present_name, unknown_quantity
 from bilayer_core.log.run.tables import component_unit
 from bilayer_core.printable import shortened
 from bilayer_core.scene.faults import listed
@@ -32,12 +32,11 @@ from bilayer_core.scene.units import parse_quantity
 
 Array = np.ndarray
 TIME, SIGMA = "time", ".sigma"
-NOT_COMPARED = {
+NOT_COMPARED: dict[str | tuple[str, ...], str] = {
     "solver": "is a figure of the solver, which no measurement has",
-    "material_frames": "is a quaternion, whose sign means nothing; take positions",
-    "body_quaternions": "is a quaternion, whose sign means nothing; take positions",
+    QUATERNION: "is a quaternion, whose sign means nothing; take positions",
 }
-"""Quantities that cannot be data, by their attributes in a frame, and why."""
+"""Quantities that cannot be data, by their attributes in a frame or their labels, and why."""
 _HEADING = re.compile(
     r"\s*(?P<name>[^\[\].]+?)(?:\[(?P<node>-?\d+)\])?(?:\.(?!sigma\b)(?P<label>\w+))?(?P<sigma>\.sigma)?\s*"
     r"(?:\[(?P<unit>[^\[\]]*)\])?\s*"
@@ -140,7 +139,7 @@ def read_data(
     for heading, values in cells.items():
         match = _HEADING.fullmatch(heading)
         if match is None:
-            wanted = "must be named like com.z, com.z [mm] or rod/arm/laminate/curvature[4]"
+            wanted = "must be named like com.z, com.z [mm] or rod/arm/curvature[4]"
             raise InputError(f"{source}: column {heading!r}: {wanted}")
         if match["name"] == TIME and not match["label"] and not match["sigma"] and match["node"] is None:
             if times is not None:
@@ -290,12 +289,12 @@ def _times(source: str, lines: list[str], times: Array, duration: float) -> Arra
 def _column(
     source: str, heading: str, match: re.Match[str], values: Array, known: Mapping[str, Entry], nodes: Mapping[str, int]
 ) -> Column:
-    of, name = f"{source}: column {heading}", match["name"].strip()
+    of, name = f"{source}: column {heading}", present_name(match["name"].strip(), known)
     if name not in known:
         raise InputError(f"{of}: {unknown_quantity(name, known)}")
     entry = known[name]
-    if entry.attribute in NOT_COMPARED:
-        raise InputError(f"{of}: {NOT_COMPARED[entry.attribute]}")
+    if reason := NOT_COMPARED.get(entry.attribute) or NOT_COMPARED.get(entry.labels):
+        raise InputError(f"{of}: {reason}")
     place: tuple[int, ...] = ()
     node, label = match["node"], match["label"]
     if entry.of_shape:

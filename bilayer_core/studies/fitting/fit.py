@@ -60,7 +60,7 @@ def fit(
         As `load_scene` takes it.
     data : str, Path or mapping
         A csv file, or arrays by the names of their columns (a table of pandas is one): ``time`` and quantities, such as
-        ``com.z [mm]`` or ``rod/strip/laminate/position[-1].x``; see `studies.fitting.data`.
+        ``com.z [mm]`` or ``rod/strip/position[-1].x``; see `studies.fitting.data`.
     parameters : sequence of str or mapping
         ``PATH=LO:HI`` or ``PATH=LO:HI:START``, or ``(lo, hi)`` or ``(lo, hi, start)`` by paths. Without a start it is
         the scene's value, if that is between the bounds, else their middle.
@@ -97,9 +97,7 @@ def fit(
 
 
 def _configured(scene: Any, overrides: Overrides, dt: float | str | None) -> SceneConfig:
-    config = scene if isinstance(scene, SceneConfig) else load_scene(scene, overrides)
-    if isinstance(scene, SceneConfig) and overrides:
-        config = load_scene(scene_content(scene), overrides)
+    config = load_scene(scene, overrides)
     return config if dt is None else load_scene(scene_content(config), {"solver.dt": dt, "solver.tolerance": None})
 
 

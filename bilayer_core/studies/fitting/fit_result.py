@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bilayer_core.errors import UnknownName
+from bilayer_core.printable import html_table
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.faults import listed, suggestion
 from bilayer_core.studies.fitting.data import Data
@@ -138,6 +139,14 @@ class FitResult:
                 return parameter
         names = list(self.values)
         raise UnknownName(f"parameter {path!r}: was not fitted{suggestion(path, names)}; fitted were {listed(names)}")
+
+    def _repr_html_(self) -> str:
+        """Return the fit as a table for notebooks."""
+        values = {of.path: str(of).partition(" = ")[2] for of in self.parameters}
+        rest = f"{int(self.data.present.sum())} values, {self.freedom} degrees of freedom, {self.runs} runs"
+        agreement = {} if self.probability is None else {"probability of the residuals": f"{self.probability:.2g}"}
+        warnings = {f"warning {k}": text for k, text in enumerate(self.warnings, 1)}
+        return html_table(f"Fit of {self.scene.name}", values | {"data": rest} | agreement | warnings)
 
     def __repr__(self) -> str:
         values = "; ".join(map(str, self.parameters))

@@ -8,13 +8,13 @@ import numpy as np
 
 from bilayer_core.errors import BilayerError, InputError, SceneError, SimulationError
 from bilayer_core.log.messages.encoders import SOLVER_LABELS
+from bilayer_core.log.run.frame_values import FrameValues
 from bilayer_core.log.run.quantities import Entry, entries
-from bilayer_core.observed.frame import Frame
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.loader import load_scene, scene_content
 from bilayer_core.scene.overrides import Override
 from bilayer_core.simulation.simulator import Simulator
-from bilayer_core.studies.fitting.data import Column, Data
+from bilayer_core.studies.fitting.data import Data
 from bilayer_core.studies.fitting.parameters import Parameter, told
 
 Array = np.ndarray
@@ -30,15 +30,8 @@ def known_quantities(simulator: Simulator) -> tuple[dict[str, Entry], dict[str, 
     """Return the quantities of a scene by name, and the number of nodes of those that nodes have."""
     frame = simulator.frame()
     known = {entry.name: entry for entry in entries(simulator.description, frame.energy, SOLVER_LABELS)}
-    plain = {name: entry for name, entry in known.items() if entry.of_shape and entry.attribute != "material_frames"}
-    return known, {name: len(getattr(frame, entry.attribute)[entry.index]) for name, entry in plain.items()}
-
-
-def value_of(column: Column, frame: Frame) -> float:
-    """Return the value of a column in a frame, in double precision."""
-    held = getattr(frame, column.entry.attribute)
-    values = held[column.entry.index]
-    return float(values[column.place] if column.place else values)
+    values = FrameValues(simulator.description)
+    return known, {name: len(values.of(entry, frame)) for name, entry in known.items() if entry.of_shape}
 
 
 class Runs:
@@ -150,11 +143,12 @@ class Runs:
 
     def _run(self, simulator: Simulator) -> Array:
         values = np.empty((self._data.times.size, len(self._data.columns)))
+        in_frames = FrameValues(simulator.description)
         for k, time in enumerate(self._data.times.tolist()):
             if time > simulator.time:
                 simulator.run(until=time)
             frame = simulator.frame()
-            values[k] = [value_of(column, frame) for column in self._data.columns]
+            values[k] = [in_frames.of(column.entry, frame)[column.place] for column in self._data.columns]
         return values
 
 

@@ -1,0 +1,60 @@
+"""Values of quantities in single frames."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bilayer_core.log.messages.node_frames import NodeFrames
+from bilayer_core.log.run.quantities import Entry
+from bilayer_core.observed.frame import Description, Frame
+
+Array = np.ndarray
+
+
+class FrameValues:
+    """Finds the values of quantities in frames of a run.
+
+    Parameters
+    ----------
+    description : Description
+        Of the run.
+    """
+
+    def __init__(self, description: Description) -> None:
+        self._node_frames = NodeFrames(description)
+
+    def of(self, entry: Entry, frame: Frame, precision: type = float) -> Array:
+        """Return a copy of a quantity.
+
+        Parameters
+        ----------
+        entry : Entry
+        frame : Frame
+        precision : type
+            Of the numbers from which the quantity is derived, and of its values.
+
+        Returns
+        -------
+        ndarray
+        """
+        if entry.attribute == "energy":
+            return np.array(frame.energy[str(entry.index)])
+        if entry.attribute == "solver":
+            return np.array(float(getattr(frame, str(entry.index))))
+        held = self._held(entry.attribute, frame).astype(precision)
+        return entry.taken(held[None], tuple(entry.index))[0].copy()
+
+    def _held(self, attribute: str, frame: Frame) -> Array:
+        if attribute in ("material_frames", "nodes"):
+            self._node_frames.update(frame)
+            quaternions: Array = self._node_frames.quaternions
+            return quaternions if attribute == "material_frames" else joined(self._node_frames.positions, quaternions)
+        if attribute == "points":
+            return joined(frame.positions, frame.strain[:, None], frame.curvature[:, None], frame.contact_forces)
+        found: Array = getattr(frame, attribute)
+        return found
+
+
+def joined(*parts: Array) -> Array:
+    """Return arrays side by side along their last axis."""
+    return np.concatenate(parts, axis=-1)
