@@ -1,6 +1,7 @@
 """Figures of recorded quantities, as papers want them: units on the axes, small fonts, the width of a column.
 
-Quantities of one unit share a panel, panels share the axis of time. matplotlib is imported when a figure is drawn.
+Quantities of one unit share a panel; panels share the axis of time or of another quantity. matplotlib is imported when
+a figure is drawn.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import io
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -40,6 +41,7 @@ PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
 WITH_PREFIX = ("m", "N", "J", "N m", "s", "m/s")
 KINDS = {"m": "position", "N": "force", "N m": "moment", "J": "energy", "1/m": "curvature"}
 """What a panel with several quantities shows, by its unit."""
+WORDS = {"com": "centre of mass", "min gap": "least gap"}
 MOST_LINES = 40
 """In one panel."""
 MOST_POINTS = 20_000
@@ -74,6 +76,37 @@ class Line:
     unit: str
     times: np.ndarray
     values: np.ndarray
+    over_unit: str = "s"
+    """Of `times`, which may be another quantity."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Quantity that curves are drawn over, with the limits and the title of the figure.
+
+    Attributes
+    ----------
+    name : str, optional
+        A quantity, with its component; by default time.
+    across, upwards : tuple of float, optional
+        Limits of both axes, in the units that they show.
+    title : str
+    """
+
+    name: str | None = None
+    across: tuple[float, float] | None = None
+    upwards: tuple[float, float] | None = None
+    title: str = ""
+
+    def over(self, run: RunData, lines: list[Line], node: int | None) -> list[Line]:
+        """Return the curves of a run over the quantity; between its own times it goes on straight lines."""
+        if self.name is None:
+            return lines
+        found = lines_of(run, 0, [self.name], node)
+        if len(found) != 1:
+            raise InputError(f"--x: {self.name!r} is {len(found)} curves; name one, such as {found[0].name}")
+        (x,) = found
+        return [replace(of, times=np.interp(of.times, x.times, x.values), over_unit=x.unit) for of in lines]
 
 
 def lines_of(run: Recorded, number: int, wanted: Sequence[str], node: int | None = None) -> list[Line]:
@@ -128,8 +161,9 @@ def plot(
     width: str | float = "single",
     labels: Sequence[str] = (),
     force: bool = False,
+    axis: Axis | None = None,
 ) -> None:
-    """Draw quantities of logs over time, the same of several logs in one panel.
+    """Draw quantities of logs, the same of several logs in one panel.
 
     Parameters
     ----------
@@ -146,6 +180,8 @@ def plot(
         What the legend calls each log; by default the names of their files.
     force : bool
         Replace an existing file.
+    axis : Axis, optional
+        What they are drawn over; by default time.
 
     Raises
     ------
@@ -159,10 +195,11 @@ def plot(
         check_output_path(out, force, Path(out).suffix.lower())
     if labels and len(labels) != len(logs):
         raise InputError(f"--label: is given {len(labels)} times, and there are {len(logs)} logs; give one for each")
-    lines = []
+    lines, axis = [], axis or Axis()
     for k, log in enumerate(logs):
         try:
-            lines += lines_of(_run(log), k, quantities, node)
+            run = _run(log)
+            lines += axis.over(run, lines_of(run, k, quantities, node), node)
         except InputError as error:
             raise InputError(str(error) if str(log) in str(error) else f"{log}: {error}") from error
     names = list(labels) or _short_names(logs)
@@ -172,7 +209,7 @@ def plot(
     with matplotlib.rc_context(STYLE):
         if out is None and matplotlib.get_backend().lower() in ("agg", "pdf", "svg", "ps", "template"):
             raise InputError("plot: there is no screen to show the figure on; give --out FIGURE.pdf, .png or .svg")
-        figure = draw(lines, names, width)
+        figure = draw(lines, names, width, axis)
         try:
             if out is None:
                 pyplot.show()
@@ -186,10 +223,11 @@ def plot(
             pyplot.close(figure)
 
 
-def draw(lines: Sequence[Line], names: Sequence[str], width: str | float = "single"):
+def draw(lines: Sequence[Line], names: Sequence[str], width: str | float = "single", axis: Axis | None = None):
     """Return a figure of curves, with a panel for each unit; `names` are those of the runs."""
     import matplotlib.pyplot as pyplot
 
+    axis = axis or Axis()
     panels: dict[str, list[Line]] = {}
     for line in lines:
         panels.setdefault(line.unit, []).append(line)
@@ -209,7 +247,25 @@ def draw(lines: Sequence[Line], names: Sequence[str], width: str | float = "sing
     )
     for axes, (unit, held), legend in zip(all_axes[:, 0], panels.items(), legends, strict=True):
         _draw_panel(axes, unit, held, legend)
-    all_axes[-1, 0].set_xlabel("time [s]")
+    last = all_axes[-1, 0]
+    if axis.name is None:
+        last.set_xlabel("time [s]")
+    else:
+        unit = lines[0].over_unit
+        factor, prefix = _prefix(unit, [line.times for line in lines])
+        last.set_xlabel(words_of(axis.name) + (f" [{prefix}{unit}]" if unit else ""))
+        for curve in (of for axes in figure.axes for of in axes.get_lines()):
+            curve.set_xdata(np.asarray(curve.get_xdata()) / factor)
+        last.relim()
+        last.autoscale()
+    if axis.across is not None:
+        last.set_xlim(axis.across)
+    if axis.upwards is not None:
+        if len(panels) > 1:
+            raise InputError("--ylim: there are panels of several units; draw one unit, or leave it out")
+        last.set_ylim(axis.upwards)
+    if axis.title:
+        figure.suptitle(axis.title, fontsize=FONT_SIZE)
     figure.align_ylabels()
     return figure
 
@@ -236,7 +292,7 @@ class _Legend:
 
 
 def _draw_panel(axes, unit: str, held: list[Line], legend: _Legend) -> None:
-    factor, prefix = _prefix(unit, held)
+    factor, prefix = _prefix(unit, [line.values for line in held])
     own = list(dict.fromkeys(line.name for line in held))
     for line, label in zip(held, legend.labels, strict=True):
         first, second = (line.run, own.index(line.name)) if len(own) == 1 else (own.index(line.name), line.run)
@@ -264,15 +320,21 @@ def _draw_panel(axes, unit: str, held: list[Line], legend: _Legend) -> None:
 def _label(own: list[str], unit: str) -> str:
     """Return a label for the quantities of a panel, in one or two words."""
     if len(own) == 1:
-        head, comma, node = own[0].partition(", ")
-        parts = head.split("/")
-        return (
-            "/".join(parts[1:] if parts[0] in ("rod", "body") else parts)
-            if len(head) < 24
-            else parts[-1] + comma + node
-        )
+        return words_of(own[0])
     starts = {name.partition("/")[0] for name in own}
     return KINDS.get(unit) or (starts.pop() if len(starts) == 1 else "value")
+
+
+def words_of(name: str) -> str:
+    """Return a name of a quantity in words: ``strip position, z, node 50`` for ``rod/strip/position.z, node 50``."""
+    head, comma, node = name.partition(", ")
+    path, dot, component = head.rpartition(".")
+    parts = (path or component).replace("_", " ").split("/")
+    if parts[0] in ("rod", "body", "stimulus"):
+        parts = parts[1:]
+    elif parts[0] == "energy":
+        parts = [*parts[1:], "energy"]
+    return WORDS.get(shown := " ".join(parts), shown) + (f", {component}" if dot else "") + comma + node
 
 
 def _without_common(names: list[str]) -> dict[str, str]:
@@ -282,11 +344,11 @@ def _without_common(names: list[str]) -> dict[str, str]:
     return {name: name[cut:] for name in names}
 
 
-def _prefix(unit: str, held: list[Line]) -> tuple[float, str]:
-    """Return the factor and SI prefix by which the largest value of a panel is at least 1."""
+def _prefix(unit: str, held: Sequence[np.ndarray]) -> tuple[float, str]:
+    """Return the factor and SI prefix by which the largest of all values is at least 1."""
     if unit not in WITH_PREFIX:
         return 1.0, ""
-    finite = [np.abs(line.values[np.isfinite(line.values)]).max(initial=0.0) for line in held]
+    finite = [np.abs(values[np.isfinite(values)]).max(initial=0.0) for values in held]
     largest = max(finite, default=0.0)
     if largest == 0.0:
         return 1.0, ""

@@ -285,7 +285,7 @@ class _Setting:
 
     @property
     def has_trail(self) -> bool:
-        """Whether the eye moves, which hides how far the robot went."""
+        """True where the eye moves, which hides how far the robot went."""
         return len({tuple(shot.eye) for shot in self.shots}) > 1
 
 

@@ -10,7 +10,7 @@ from support import synthetic_run
 from bilayer_core import read_log
 from bilayer_core.cli import main
 from bilayer_core.log.file.mcap_log import McapRecorder
-from bilayer_core.view.plot import MOST_POINTS, STYLE, Line, draw, lines_of
+from bilayer_core.view.plot import MOST_POINTS, STYLE, Axis, Line, draw, lines_of, words_of
 
 matplotlib.use("agg")
 TIMES = np.arange(0, 26) * 0.02
@@ -37,12 +37,36 @@ def test_quantities_of_one_unit_share_a_panel_with_that_unit(logs, closing):
     run = read_log(logs / "slow.mcap")
     figure = draw(lines_of(run, 0, ["com.z", "energy/*", "body/ball/contact_wrench"]), ["slow"])
     labels = [axes.get_ylabel() for axes in figure.axes]
-    assert labels == ["com.z [mm]", "energy [µJ]", "force [mN]", "moment [N m]"]
+    assert labels == ["centre of mass, z [mm]", "energy [µJ]", "force [mN]", "moment [N m]"]
     assert figure.axes[-1].get_xlabel() == "time [s]"
     (line,) = figure.axes[0].get_lines()
     np.testing.assert_allclose(line.get_ydata(), 1e3 * run.com[:, 2])
     told = [text.get_text() for text in figure.axes[1].get_legend().get_texts()]
     assert told == list(synthetic_run.TERMS)
+
+
+def test_a_quantity_is_drawn_over_another_one_within_limits(logs, closing):
+    run, axis = read_log(logs / "slow.mcap"), Axis("body/ball/position.z", (20.0, 22.0), (0.0, 60.0), "One lift")
+    figure = draw(axis.over(run, lines_of(run, 0, ["com.z"]), None), ["slow"], axis=axis)
+    (axes,) = figure.axes
+    (line,) = axes.get_lines()
+    np.testing.assert_allclose(line.get_xdata(), 1e3 * run["body/ball/position"].values[:, 2])
+    np.testing.assert_allclose(line.get_ydata(), 1e3 * run.com[:, 2])
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("ball position, z [mm]", "centre of mass, z [mm]")
+    assert (axes.get_xlim(), axes.get_ylim(), figure.get_suptitle()) == ((20.0, 22.0), (0.0, 60.0), "One lift")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("rod/arm_1/position.z, node 40", "arm 1 position, z, node 40"),
+        ("energy/kinetic", "kinetic energy"),
+        ("stimulus/humidity", "humidity"),
+        ("min_gap", "least gap"),
+    ],
+)
+def test_axes_have_labels_in_words(name, words):
+    assert words_of(name) == words
 
 
 def test_several_logs_are_drawn_over_each_other_and_named(logs, closing, tmp_path):
@@ -75,7 +99,7 @@ def test_a_figure_has_the_width_of_a_column(suffix, logs, tmp_path):
 
         assert abs(Image.open(out).width - 86 / 25.4 * 300) <= 1.0
     elif suffix == "svg":
-        assert b"com.z [mm]" in data
+        assert b"centre of mass, z [mm]" in data
         assert float(re.search(rb'<svg[^>]* width="([\d.]+)pt"', data)[1]) == pytest.approx(86 / 25.4 * 72, abs=0.1)
     else:
         assert data.startswith(b"%PDF") and b"/Type3" not in data
@@ -108,6 +132,9 @@ def test_long_curves_keep_their_extremes(closing):
         ([f"{ROD}/strain", "--node", "41"], "--node: 41 is not allowed; rod/arm_1/active/strain has nodes 0 to 40"),
         (["com", "--out", "a.jpg"], "must end in .pdf, .png or .svg"),
         (["com", "--width", "huge"], "--width: huge is not allowed"),
+        (["com.z", "--x", "com", "--out", "a.pdf"], "--x: 'com' is 3 curves; name one, such as com.x"),
+        (["com", "energy/bend", "--ylim", "0:1", "--out", "a.pdf"], "--ylim: there are panels of several units"),
+        (["com", "--xlim", "2:1"], "found '2:1'; allowed are two numbers, the smaller one first"),
         (["com", "--label", "a", "--label", "b"], "--label: is given 2 times, and there are 1 logs"),
         (["com"], "there is no screen to show the figure on"),
         ([], "say which quantities, such as com.z"),
