@@ -13,6 +13,7 @@ from bilayer_core.engine.energy_account import OPEN, QUESTIONED
 from bilayer_core.errors import InputError
 from bilayer_core.forces.force_register import memory_size
 from bilayer_core.integrators.integrator_register import INTEGRATORS
+from bilayer_core.log.run.quantities import entries
 from bilayer_core.model.build_model import build_model
 from bilayer_core.model.findings import told
 from bilayer_core.model.fingerprint import conditions_of, fingerprint_of
@@ -31,6 +32,7 @@ from bilayer_core.simulation.controls import Controls
 from bilayer_core.simulation.energy_budget import EnergyLedger
 from bilayer_core.simulation.equilibrium import StaticReport, solve_static
 from bilayer_core.simulation.friction_changes import coefficients
+from bilayer_core.simulation.gradient import Equilibrium, Gradient, differentiate
 from bilayer_core.simulation.momentum import angular_momentum_of, momentum_of
 from bilayer_core.simulation.observation import (
     describe,
@@ -148,8 +150,11 @@ class Simulator:
         return self._stepper_of(self.model if same else build_model(self.scene, self.plan.model, dimension))
 
     def _initial_state(self) -> State:
-        marks = self._fingerprint, memory_size(self.model), self._conditions
-        return initial_state(self.model, self._keeps_history, *marks)
+        return self._state_of(self.model)
+
+    def _state_of(self, model: Model) -> State:
+        """Return the first state of the model, or of one with other numbers in its scene."""
+        return initial_state(model, self._keeps_history, self._fingerprint, memory_size(model), self._conditions)
 
     def _note_start(self) -> None:
         com = center_of_mass(self.model, self._state)
@@ -592,6 +597,44 @@ class Simulator:
                 return solve_static(self._stepper, self._state, tolerance, self._in_space)
             finally:
                 self._loop.take_state()
+
+    def gradient(self, of: str | Sequence[str], to: str | Sequence[str]) -> Gradient:
+        """Differentiate the equilibrium at which the robot is; see `simulation.gradient`.
+
+        Parameters
+        ----------
+        of : str or sequence of str
+            Quantities by the names that logs have: ``"com"``, ``"rod/strip/laminate/position"``, ``"energy/bending"``,
+            ``"body/wall/clamp_wrench"``.
+        to : str or sequence of str
+            Channels of stimuli, and paths of numbers in the scene, or of lists of numbers, as ``--set`` takes them:
+            ``"materials.gel.youngs_modulus"``.
+
+        Returns
+        -------
+        Gradient
+            Arrays by quantity and parameter: ``found["com", "humidity"]``.
+
+        Raises
+        ------
+        InputError
+            If the robot is not at rest, there is no such quantity or parameter, or a parameter acts on nothing.
+        SimulationError
+            If the equilibrium is unstable.
+        """
+        self.compile()
+
+        def model_of(scene: SceneConfig) -> Model:
+            return build_model(scene, self.plan.model, self.plan.dimension)
+
+        here = Equilibrium(self._stepper, self._state, model_of, self._stepper_of, self._state_of)
+        asked = [[names] if isinstance(names, str) else list(names) for names in (of, to)]
+        known = [
+            entry
+            for entry in entries(self.description, self.energy(), ())
+            if not entry.name.startswith("stimulus/") and not entry.name.endswith("/frame")
+        ]
+        return differentiate(here, known, *asked)
 
     def save_state(self) -> Array:
         """Return a flat copy of the state; `load_state` continues from it bit for bit.
