@@ -599,7 +599,7 @@ class Simulator:
                 self._loop.take_state()
 
     def gradient(self, of: str | Sequence[str], to: str | Sequence[str]) -> Gradient:
-        """Differentiate the equilibrium at which the robot is; see `simulation.gradient`.
+        """Return derivatives of the equilibrium at which the robot is; see `simulation.gradient`.
 
         Parameters
         ----------
