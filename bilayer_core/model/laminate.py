@@ -353,9 +353,15 @@ def _add_eigenstrain(
     of_edges: list[tuple[Array, ...]] = []
     of_joints: list[tuple[Array, ...]] = []
     strip = section_of(scene, rod) == "strip"
-    followed = [(slot, layer, law) for slot, layer in enumerate(rod.layers) for law in layer.eigenstrain]
-    for slot, layer, law in followed:
+    followed = [
+        (slot, layer, law, hat)
+        for slot, layer in enumerate(rod.layers)
+        for given in layer.eigenstrain
+        for law, hat in ([(given, None)] if is_light(scene, given) else given.at_points(rod.path.length))
+    ]
+    for slot, layer, law, hat in followed:
         edges, covered = np.array(rod.driven_edges(layer, law)), driven_cells(rod, cells, layer, law)
+        part = 1.0 if hat is None else values_at(hat, rod.edge_length * rod.on_path(cells.middle))
         if is_light(scene, law):
             heights = np.full(rod.stations - 1, axis)
             laws = add_lit_elements(found, scene, rod, layer, law, edges, strands[0].first_edge, heights)
@@ -365,7 +371,11 @@ def _add_eigenstrain(
             ]
         else:
             groups = [
-                (found.law(scene, law, response), with_copies(rod, edges), _on_cells(response, cells))
+                (
+                    found.law(scene, law, response, of_point=hat is not None),
+                    with_copies(rod, edges),
+                    _on_cells(response, cells) * part,
+                )
                 for response in responses(rod, layer, law)
             ]
         for (mean, gradient), driven, along in groups:

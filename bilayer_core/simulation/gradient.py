@@ -35,6 +35,7 @@ from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.loader import load_content, scene_content
 from bilayer_core.scene.overrides import read_overrides
 from bilayer_core.simulation.capture import make_frame
+from bilayer_core.simulation.gains import alike_but_gains, put_gains
 from bilayer_core.simulation.statistics import RunStatistics
 from bilayer_core.simulation.stepper import Stepper
 
@@ -134,7 +135,7 @@ class Nearby:
 
     def _put_gains(self) -> None:
         if self._gains is not None:
-            self._stepper.model.drives.law_gain[:] = self._gains
+            put_gains(self._stepper.model, self._gains)
 
     def moved(self, motion: Motion) -> State:
         """Return the state after a motion."""
@@ -273,7 +274,6 @@ class Equilibrium:
         self._gains = model.drives.law_gain.copy()
         arrays = {name: getattr(model.drives, name) for name in model.drives.names}
         self.model = replace(model, drives=type(model.drives)(**arrays | {"law_gain": self._gains.copy()}))
-        self.model.drives.law_gain.flags.writeable = True
         self._stepper, self._evaluator = stepper_of(self.model), Evaluator(self.model)
         self._state = state.copy()
         for part in RATES:
@@ -399,13 +399,11 @@ class Equilibrium:
         if not gains:
             return {}
         changed = {p.name: p.value + STEP * (1.0 + k / len(gains)) * p.scale for k, p in enumerate(gains)}
-        drives = self._model_of(load_content(scene_content(self.scene), changed)).drives
-        own = self.model.drives
-        same = (np.array_equal(getattr(own, n), getattr(drives, n)) for n in drives.names if n != "law_gain")
-        if len(drives.law_gain) != len(self._gains) or not all(same):
+        other = self._model_of(load_content(scene_content(self.scene), changed))
+        if not alike_but_gains(self.model, other):
             return {}
-        laws = {name: np.flatnonzero(drives.law_gain == value) for name, value in changed.items()}
-        moved = np.flatnonzero(drives.law_gain != self._gains)
+        laws = {name: np.flatnonzero(other.drives.law_gain == value) for name, value in changed.items()}
+        moved = np.flatnonzero(other.drives.law_gain != self._gains)
         told = np.sort(np.concatenate(list(laws.values())))
         return laws if np.array_equal(told, moved) and all(of.size for of in laws.values()) else {}
 

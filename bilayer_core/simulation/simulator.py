@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -26,12 +27,13 @@ from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.observed.inputs import RESET, Input
 from bilayer_core.observed.observer import Observer
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.scene.loader import load_scene
+from bilayer_core.scene.loader import load_content, load_scene, scene_content
 from bilayer_core.simulation.capture import make_frame
 from bilayer_core.simulation.controls import Controls
 from bilayer_core.simulation.energy_budget import EnergyLedger
 from bilayer_core.simulation.equilibrium import StaticReport, solve_static
 from bilayer_core.simulation.friction_changes import coefficients
+from bilayer_core.simulation.gains import alike_but_gains, put_gains
 from bilayer_core.simulation.gradient import Equilibrium, Gradient, differentiate
 from bilayer_core.simulation.momentum import angular_momentum_of, momentum_of
 from bilayer_core.simulation.observation import (
@@ -355,6 +357,46 @@ class Simulator:
             given without a value; nothing is changed then.
         """
         self._controls.set_stimulus(channel, value, over=over)
+
+    def set_gains(self, gains: Mapping[str, Any]) -> None:
+        """Give eigenstrains other gains, from the next step on; nothing is built anew.
+
+        Parameters
+        ----------
+        gains : mapping of str to object
+            Values by the paths of gains in the scene, or of numbers of their profiles: a number, or a profile with as
+            many points: ``{"rods.strip.layers.active.eigenstrain.gain": 0.02}``.
+
+        Raises
+        ------
+        InputError
+            If more would change than gains, as the number of points, or somebody observes the run: a log is of one
+            scene. Nothing is changed then.
+        """
+        if self._controls.listeners or self._loop.attached:
+            raise InputError("set_gains: takes no other gains while a log or an observer is attached; detach it first")
+        scene = load_content(scene_content(self.scene), gains)
+        other = build_model(scene, self.plan.model, self.plan.dimension)
+        paths = ", ".join(gains)
+        if not (all(re.search(r"\.gain(\.|$)", path) for path in gains) and alike_but_gains(self.model, other)):
+            raise InputError(
+                f"set_gains: {paths}: changes more than gains; allowed are numbers for numbers, and profiles with as "
+                "many points as before, each of its own law; else make a new Simulator"
+            )
+
+        def take(stepper: Stepper) -> None:
+            put_gains(stepper.model, other.drives.law_gain)
+            stepper.take_scene(scene, self.steps, scene.solver.max_newton_iterations)
+
+        take(self._stepper)
+        self.scene, self.model = scene, self._stepper.model
+        if self.plane_watch is not None:
+            self.plane_watch.take_scene(scene.duration, take)
+        self._fingerprint = fingerprint_of(scene, self.plan.model, self.plan.integrator if self._keeps_history else "")
+        self._conditions = float(conditions_of(scene))
+        self._state.fingerprint[:], self._state.conditions[:] = self._fingerprint, self._conditions
+        self._state.has_history.fill(0.0)  # accelerations jump
+        self._stepper.restart(self._state)
 
     def set_load(self, name: str, factor: float | None, *, over: float = 0.0) -> None:
         """Multiply force and moment of a load by a factor from the next step on.
