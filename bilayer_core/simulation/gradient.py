@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,7 @@ from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.loader import load_content, scene_content
 from bilayer_core.scene.overrides import read_overrides
 from bilayer_core.simulation.capture import make_frame
+from bilayer_core.simulation.equilibrium import solve_static
 from bilayer_core.simulation.gains import alike_but_gains, put_gains
 from bilayer_core.simulation.statistics import RunStatistics
 from bilayer_core.simulation.stepper import Stepper
@@ -161,6 +162,19 @@ class Nearby:
         except ArithmeticError:
             return found, False
 
+    def gradients_by_gains(self) -> Callable[[Array], Motion]:
+        """Return a function of the gains of laws that returns the gradient of the potential at the state."""
+        evaluator, model, at = self._evaluator, self._stepper.model, self._stand(self.state)
+
+        def gradient(gains: Array) -> Motion:
+            put_gains(model, gains)
+            rest = evaluator.rest_strains_of(self.state.transduction)
+            evaluator.set_drive(rest.edge, rest.joint, self._load_factor)
+            evaluator.evaluate(at)
+            return self._sums()
+
+        return gradient
+
     def _sums(self) -> Motion:
         sums = self._evaluator.sums
         return Motion(sums.gradient.copy(), sums.body.copy())
@@ -200,12 +214,15 @@ class Parameter:
         What its steps are parts of.
     at : callable
         Returns the model nearby at a value.
+    laws : ndarray
+        The laws whose gain it is, if nothing is built for it.
     """
 
     name: str
     value: float
     scale: float
     at: Callable[[float], Nearby]
+    laws: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 @dataclass(frozen=True)
@@ -279,13 +296,17 @@ class Equilibrium:
         for part in RATES:
             getattr(self._state, part).fill(0.0)
         self._stimulus = stepper.surroundings.stimulus_at(state, float(state.time[0]))
+        self._settle()
+
+    def _settle(self) -> None:
+        """Let Newton's method make its last corrections, and factorise the Hessian there."""
         self.residual = math.inf
         for last in (False, False, True):
             here = self._here(self._stimulus, self._gains)
             gradient, stable = here.factorise()
             if not stable:
                 reason = "the shape is unstable: no equilibrium, call solve_static first, or one that no robot keeps to"
-                raise SimulationError(f"gradient: {reason}", float(state.time[0]))
+                raise SimulationError(f"gradient: {reason}", float(self._state.time[0]))
             correction = self._solved(gradient)
             self.residual = min(self.residual, self.displacement(correction))
             if not self.residual <= NEAR_REST * self._size:
@@ -296,6 +317,65 @@ class Equilibrium:
             if not last:
                 self._state = here.moved(correction)
         self._farthest = min(STEP * self._size, OF_GAP * self._evaluator.gap)
+
+    @property
+    def positions(self) -> Array:
+        """Positions of nodes [m], shape (n_node, 3)."""
+        return self._state.position
+
+    @property
+    def gains(self) -> Array:
+        """Those of laws, a copy, shape (n_law,)."""
+        return self._gains.copy()
+
+    def fits(self, model: Model) -> bool:
+        """Return whether states of a model have the same unknowns."""
+        return model.layout.size == self.model.layout.size and _shapes(self._state_of(model)) == _shapes(self._state)
+
+    def write_shape(self, state: State) -> None:
+        """Give a state of the same model, or of one with other numbers, the shape, the stimuli and the loads."""
+        for part in ("position", "body_position", *HELD):
+            getattr(state, part)[:] = getattr(self._state, part)
+
+    def go_to(self, gains: Array) -> None:
+        """Go to the equilibrium with other gains of laws, shape (n_law,).
+
+        Raises
+        ------
+        SimulationError
+            If there is none; nothing is changed then.
+        """
+        before, state = self._gains.copy(), self._state.copy()
+        try:
+            self._gains[:] = gains
+            put_gains(self.model, gains)
+            solve_static(self._stepper, self._state)
+            self._settle()
+        except SimulationError:
+            self._gains[:], self._state = before, state
+            self._settle()
+            raise
+
+    def velocities(self, parameters: Sequence[Parameter]) -> Array:
+        """Return dx/dp of nodes by each parameter from one difference each: exact where forces are linear in it, as in
+        gains, shape (n_node, 3, n_parameter).
+        """
+        here = self._here(self._stimulus, self._gains)
+        gradient, columns = here.gradient(here.state), []
+        places, gains = self.model.layout.node[:, None] + np.arange(3), here.gradients_by_gains()
+        for parameter in parameters:
+            h, shift = STEP * parameter.scale, 0.0
+            if parameter.laws.size:
+                changed = self._gains.copy()
+                changed[parameter.laws] += h
+                other = gains(changed)
+            else:
+                near = parameter.at(parameter.value + h)
+                other, shift = near.gradient(near.state), near.state.position - self._state.position
+            motion = self._solved((other + gradient * -1.0) * (1.0 / h))
+            columns.append(motion.unknowns[places] + shift / h)
+        put_gains(self.model, self._gains)
+        return np.stack(columns, axis=-1)
 
     def _here(self, stimulus: Array, gains: Array) -> Nearby:
         """Return the present model with other stimuli or gains."""
@@ -318,7 +398,7 @@ class Equilibrium:
     def _carried(self, model: Model) -> State | None:
         """Return the state of another model that departs from its start as the present one does."""
         state, here, start = self._state_of(model), self._state, self._start
-        if state.position.shape != here.position.shape or model.layout.size != self.model.layout.size:
+        if not self.fits(model):
             return None
         turned = state.body_rotation @ start.body_rotation.swapaxes(1, 2)
         same = np.array_equal(state.body_rotation, start.body_rotation)
@@ -346,10 +426,6 @@ class Equilibrium:
         turns = [motion.unknowns[self.model.rods.edge_unknown], motion.bodies[:, 3:].ravel()]
         angle = max((np.abs(part).max(initial=0.0) for part in turns), default=0.0)
         return float(max(lengths, np.abs(motion.bodies[:, :3]).max(initial=0.0), self._size * angle))
-
-    def positions_along(self, motion: Motion) -> Array:
-        """Return the velocities of nodes in a motion, shape (n_node, 3)."""
-        return motion.unknowns[self.model.layout.node[:, None] + np.arange(3)]
 
     def parameters(self, names: Sequence[str]) -> dict[str, list[Parameter]]:
         """Return parameters by the names that users give them: one, or those of a list of numbers.
@@ -415,7 +491,7 @@ class Equilibrium:
             gains[laws] = value
             return self._here(self._stimulus, gains)
 
-        return replace(parameter, at=gained)
+        return replace(parameter, at=gained, laws=laws)
 
     def respond(self, parameter: Parameter, corrected: bool = True) -> Response:
         """Return how the equilibrium moves with a parameter; not `corrected`, as the Hessian alone tells.
@@ -456,6 +532,10 @@ class Equilibrium:
         reason = f"{parameter.name}: corrections do not get small ({left:.3g} of the whole is left)"
         remedy = "the equilibrium is about to become unstable, or its forces depend on it in jumps"
         return SimulationError(f"gradient: {reason}; {remedy}", float(self._state.time[0]))
+
+
+def _shapes(state: State) -> list[tuple[int, ...]]:
+    return [getattr(state, part).shape for part in ("position", "body_position", *HELD)]
 
 
 def _tangents(model: Model, position: Array) -> Array:

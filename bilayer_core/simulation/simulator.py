@@ -664,12 +664,7 @@ class Simulator:
         SimulationError
             If the equilibrium is unstable.
         """
-        self.compile()
-
-        def model_of(scene: SceneConfig) -> Model:
-            return build_model(scene, self.plan.model, self.plan.dimension)
-
-        here = Equilibrium(self._stepper, self._state, model_of, self._stepper_of, self._state_of)
+        here = self._equilibrium()
         asked = [[names] if isinstance(names, str) else list(names) for names in (of, to)]
         known = [
             entry
@@ -677,6 +672,15 @@ class Simulator:
             if not entry.name.startswith("stimulus/") and not entry.name.endswith("/frame")
         ]
         return differentiate(here, known, *asked)
+
+    def _equilibrium(self) -> Equilibrium:
+        """Return the equilibrium at which the robot is, with the factor of its Hessian, for studies; see `gradient`."""
+        self.compile()
+
+        def model_of(scene: SceneConfig) -> Model:
+            return build_model(scene, self.plan.model, self.plan.dimension)
+
+        return Equilibrium(self._stepper, self._state, model_of, self._stepper_of, self._state_of)
 
     def save_state(self) -> Array:
         """Return a flat copy of the state; `load_state` continues from it bit for bit.
