@@ -354,8 +354,8 @@ def _between(edges: Array) -> Array:
 
 
 def _at_nodes(of_halves: Array) -> Array:
-    """Sum the values of halves of successive edges at the nodes next to them, shape (n_copy, n_edge + 1)."""
-    of_nodes = np.zeros((len(of_halves), of_halves.shape[1] + 1))
-    of_nodes[:, :-1] += of_halves[..., 0]
-    of_nodes[:, 1:] += of_halves[..., 1]
+    """Sum the values of halves of successive edges at the nodes next to them, shape (..., n_edge + 1)."""
+    of_nodes = np.zeros((*of_halves.shape[:-2], of_halves.shape[-2] + 1))
+    of_nodes[..., :-1] += of_halves[..., 0]
+    of_nodes[..., 1:] += of_halves[..., 1]
     return of_nodes
