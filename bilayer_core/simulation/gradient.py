@@ -493,8 +493,8 @@ class Equilibrium:
 
         return replace(parameter, at=gained, laws=laws)
 
-    def respond(self, parameter: Parameter, corrected: bool = True) -> Response:
-        """Return how the equilibrium moves with a parameter; not `corrected`, as the Hessian alone tells.
+    def respond(self, parameter: Parameter) -> Response:
+        """Return how the equilibrium moves with a parameter.
 
         Raises
         ------
@@ -515,7 +515,7 @@ class Equilibrium:
                 raise self._failure(parameter, travel)
         correction, moves = motion, travel > NOTHING * self._size
         before = math.inf
-        for _ in range(MOST if corrected and moves else 0):
+        for _ in range(MOST if moves else 0):
             shapes = [of.moved(motion * (place * h)) for of, place in zip(nearby, PLACES, strict=True)]
             correction = self._solved(_slope([of.gradient(s) for of, s in zip(nearby, shapes, strict=True)], h))
             part = self.displacement(correction) / self.displacement(motion)
@@ -524,7 +524,7 @@ class Equilibrium:
             motion, before = motion + correction, part
             if part <= CONVERGED:
                 break
-        if corrected and moves and not before <= GOOD:
+        if moves and not before <= GOOD:
             raise self._failure(parameter, before)
         return Response(motion, correction, nearby, h, moves)
 
