@@ -1,8 +1,8 @@
 """Simulation of bilayer soft robots: scenes, the numerical core, logs, pictures and the command line.
 
-``load_scene``, ``Simulator``, ``Recorder``, ``estimate_error``, ``fit``, ``read_log``, ``compare``, ``sweep``,
-``optimise``, ``read_results``, ``__version__`` and the classes of scenes (``Scene``, ``Rod``, ``Layer``, ...) are
-loaded at their first use: importing the package costs nothing.
+``load_scene``, ``Simulator``, ``Recorder``, ``estimate_error``, ``fit``, ``design``, ``read_log``, ``compare``,
+``sweep``, ``optimise``, ``read_results``, ``__version__`` and the classes of scenes (``Scene``, ``Rod``, ``Layer``, ...)
+are loaded at their first use: importing the package costs nothing.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ if TYPE_CHECKING:  # what checkers of types take for true, without an import of 
     from bilayer_core.simulation.simulator import Simulator
     from bilayer_core.studies.converge.study import estimate_error
     from bilayer_core.studies.fitting.fit import fit
+    from bilayer_core.studies.shaping.shape_search import design
     from bilayer_core.studies.sweeps.optimise import optimise
     from bilayer_core.studies.sweeps.run_sweep import sweep
     from bilayer_core.studies.sweeps.sweep_result import read_results
@@ -30,6 +31,7 @@ _HOME = {
     "Recorder": "bilayer_core.log.run.recorder",
     "Simulator": "bilayer_core.simulation.simulator",
     "compare": "bilayer_core.log.run.compare",
+    "design": "bilayer_core.studies.shaping.shape_search",
     "estimate_error": "bilayer_core.studies.converge.study",
     "fit": "bilayer_core.studies.fitting.fit",
     "load_scene": "bilayer_core.scene.loader",
@@ -106,6 +108,7 @@ __all__ = [
     "Turning",
     "__version__",
     "compare",
+    "design",
     "estimate_error",
     "fit",
     "load_scene",

@@ -14,6 +14,7 @@ from bilayer_core.cli.bench import bench
 from bilayer_core.cli.check import check
 from bilayer_core.cli.compare import compare
 from bilayer_core.cli.converge import converge
+from bilayer_core.cli.design import design
 from bilayer_core.cli.export import export
 from bilayer_core.cli.fit import fit
 from bilayer_core.cli.info import info
@@ -63,7 +64,7 @@ def program() -> None:
 
 
 SIMULATES = (scenes, new, schema, check, run, converge, validate, bench, stress)
-MANY = (sweep, fit, optimise)
+MANY = (sweep, fit, optimise, design)
 OF_LOGS = (info, repair, export, compare, plot, replay, view, render)
 
 for verb in (*SIMULATES, *MANY, *OF_LOGS):

@@ -7,7 +7,7 @@ import numpy as np
 from bilayer_core.model.plate_section import free_strain
 from bilayer_core.model.section import outline
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.scene.diffusion_modes import strain_at
+from bilayer_core.scene.diffusion_modes import strain_at, strains_at
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.profile import values_at
 from bilayer_core.scene.rod import Layer, Rod
@@ -20,7 +20,8 @@ def _eigenstrain_range(scene: SceneConfig, rod: Rod, layer: Layer, laws: tuple[E
     found = np.zeros((3, rod.stations - 1))
     for law in laws:
         channel = scene.stimuli[law.stimulus]
-        least, most = np.sort(strain_at(rod, layer, law, np.array([channel.minimum, channel.maximum])))
+        ends = strains_at(rod, layer, law, np.array([channel.minimum, channel.maximum]))
+        least, most = ends.min(), ends.max()
         driven = rod.covered_parts(np.arange(rod.stations - 1), layer, law) > 0.0
         found[:, driven] += np.array([[max(abs(least), abs(most))], [least], [most]])
     return found

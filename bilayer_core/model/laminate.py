@@ -352,10 +352,17 @@ def _add_eigenstrain(
     first_edge = np.array([[strand.first_edge] for strand in strands])
     of_edges: list[tuple[Array, ...]] = []
     of_joints: list[tuple[Array, ...]] = []
+    laws_on: list[tuple[int, int, bool, Array, Array]] = []
     strip = section_of(scene, rod) == "strip"
-    followed = [(slot, layer, law) for slot, layer in enumerate(rod.layers) for law in layer.eigenstrain]
-    for slot, layer, law in followed:
+    followed = [
+        (slot, layer, law, hat)
+        for slot, layer in enumerate(rod.layers)
+        for given in layer.eigenstrain
+        for law, hat in ([(given, None)] if is_light(scene, given) else given.at_points(rod.path.length))
+    ]
+    for slot, layer, law, hat in followed:
         edges, covered = np.array(rod.driven_edges(layer, law)), driven_cells(rod, cells, layer, law)
+        part = 1.0 if hat is None else values_at(hat, rod.edge_length * rod.on_path(cells.middle))
         if is_light(scene, law):
             heights = np.full(rod.stations - 1, axis)
             laws = add_lit_elements(found, scene, rod, layer, law, edges, strands[0].first_edge, heights)
@@ -365,26 +372,34 @@ def _add_eigenstrain(
             ]
         else:
             groups = [
-                (found.law(scene, law, response), with_copies(rod, edges), _on_cells(response, cells))
+                (
+                    found.law(scene, law, response, of_point=hat is not None),
+                    with_copies(rod, edges),
+                    _on_cells(response, cells) * part,
+                )
                 for response in responses(rod, layer, law)
             ]
-        for (mean, gradient), driven, along in groups:
-            grown = along * (covered & np.isin(cells.edge, driven))
-            for number, by_gradient in ((mean, False), (gradient, True)):
-                if number < 0:
-                    continue
-                weight, bend, curl, twist = whole.driven(slot, grown, by_gradient)
-                weight = weight[:, driven]
-                of_edges.append((first_edge + driven, np.full(weight.shape, number), weight))
-                for name, turn in (("curled", curl), ("twisted", twist)) if strip else ():
-                    turned = (turn != 0.0) & (joints >= 0)
-                    laws_of = np.full(turned.sum(), number)
-                    found.add(
-                        **{f"{name}_joint": joints[turned], f"{name}_law": laws_of, f"{name}_weight": turn[turned]}
-                    )
-                bent = (bend != 0.0) & (joints >= 0)
-                copy, _ = np.nonzero(bent)
-                of_joints.append((copy, joints[bent], np.full(len(copy), number), bend[bent]))
+        for numbers, driven, along in groups:
+            inside = np.zeros(cells.edge.max() + 1, dtype=bool)
+            inside[driven] = True
+            grown = along * (covered & inside[cells.edge])
+            laws_on += [(k, slot, bool(by), driven, grown) for by, k in enumerate(numbers) if k >= 0]
+    strains: dict[int, tuple[Array, ...]] = {}
+    for which in {(slot, by_gradient) for _, slot, by_gradient, *_ in laws_on}:  # of many laws at once
+        alike = [k for k, (_, *of, _, _) in enumerate(laws_on) if tuple(of) == which]
+        parts = whole.driven(which[0], np.stack([laws_on[k][-1] for k in alike])[:, None], which[1])
+        strains |= dict(zip(alike, zip(*parts, strict=True), strict=True))
+    for k, (number, _, _, driven, _) in enumerate(laws_on):
+        weight, bend, curl, twist = strains[k]
+        weight = weight[:, driven]
+        of_edges.append((first_edge + driven, np.full(weight.shape, number), weight))
+        for name, turn in (("curled", curl), ("twisted", twist)) if strip else ():
+            turned = (turn != 0.0) & (joints >= 0)
+            laws_of = np.full(turned.sum(), number)
+            found.add(**{f"{name}_joint": joints[turned], f"{name}_law": laws_of, f"{name}_weight": turn[turned]})
+        bent = (bend != 0.0) & (joints >= 0)
+        copy, _ = np.nonzero(bent)
+        of_joints.append((copy, joints[bent], np.full(len(copy), number), bend[bent]))
     if not of_edges:
         return
     edge, law_of_edge, weight = (np.concatenate(part, axis=1) for part in zip(*of_edges, strict=True))

@@ -106,6 +106,7 @@ def cells_of(rod: Rod, edges: int) -> Cells:
         station for layer in rod.layers for law in (None, *layer.eigenstrain) for station in rod.span_of(layer, law)
     ]
     varying = [rod.inner_radius, *(part for layer in rod.layers for part in (rod.width_of(layer), *_varying(layer)))]
+    varying += [law.gain for layer in rod.layers for law in layer.eigenstrain]
     places = [place / rod.edge_length for profile in varying if isinstance(profile, Profile) for place in profile.at]
     grid, (ends, places) = 0.5 * np.arange(2 * edges + 1), (_on_rod(rod, part, edges) for part in (ends, places))
     blended = np.zeros(edges, dtype=bool)
@@ -353,8 +354,8 @@ def _between(edges: Array) -> Array:
 
 
 def _at_nodes(of_halves: Array) -> Array:
-    """Sum the values of halves of successive edges at the nodes next to them, shape (n_copy, n_edge + 1)."""
-    of_nodes = np.zeros((len(of_halves), of_halves.shape[1] + 1))
-    of_nodes[:, :-1] += of_halves[..., 0]
-    of_nodes[:, 1:] += of_halves[..., 1]
+    """Sum the values of halves of successive edges at the nodes next to them, shape (..., n_edge + 1)."""
+    of_nodes = np.zeros((*of_halves.shape[:-2], of_halves.shape[-2] + 1))
+    of_nodes[..., :-1] += of_halves[..., 0]
+    of_nodes[..., 1:] += of_halves[..., 1]
     return of_nodes

@@ -17,6 +17,7 @@ from bilayer_core.model.strands import Collected
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.diffusion_modes import responses
 from bilayer_core.scene.eigenstrain import Eigenstrain
+from bilayer_core.scene.profile import values_at
 from bilayer_core.scene.rod import Layer, Rod
 
 Array = np.ndarray
@@ -50,7 +51,9 @@ def add_lit_elements(
         Height of the strand over the path in the middle of each edge of the path [m].
     """
     (response,) = responses(rod, layer, law)
-    numbers = np.array([found.law(scene, law, response, alone=True) for _ in edges])
+    gains = values_at(law.gain, rod.edge_length * (edges + 0.5)).tolist()
+    laws = [law.model_copy(update={"gain": gain}) for gain in gains]
+    numbers = np.array([found.law(scene, own, response, alone=True) for own in laws])
     slot = rod.layers.index(layer)
     _, thickness = outline(rod, edges + 0.5)
     own, alone = thickness[slot], thickness.sum(axis=0) == thickness[slot]

@@ -179,8 +179,16 @@ def _add_eigenstrain(
     """Add the edges of a layer that follow its laws, and the joints that follow the gradient of a field in it."""
     layer = rod.layers[slot]
     first_edge = strand.first_edge - strand.first_station
-    for law in layer.eigenstrain:
+    for law, hat in (
+        part
+        for given in layer.eigenstrain
+        for part in ([(given, None)] if is_light(scene, given) else given.at_points(rod.path.length))
+    ):
         edges, weight = _driven(rod, layer, law, strand)
+        if hat is not None:
+            begin, end = rod.span_of(layer, law)
+            begin, end = np.maximum(edges, begin), np.minimum(edges + 1.0, end)
+            weight = weight * means_between(hat, rod.edge_length * begin, rod.edge_length * end)
         if is_light(scene, law):
             _, thickness = outline(rod, np.arange(rod.stations - 1) + 0.5)
             axis = 0.0 * thickness[0] if len(rod.layers) == 1 else _OUTWARD[slot] * 0.5 * thickness[slot]
@@ -188,7 +196,7 @@ def _add_eigenstrain(
         else:
             groups = [
                 (
-                    np.tile(found.law(scene, law, response), (len(edges), 1)),
+                    np.tile(found.law(scene, law, response, of_point=hat is not None), (len(edges), 1)),
                     weight if response.along is None else weight * response.along[edges],
                 )
                 for response in responses(rod, layer, law)

@@ -53,18 +53,20 @@ class Collected:
             return np.zeros((0,) if width is None else (0, width), dtype)
         return np.concatenate(parts).astype(dtype, order="C", copy=False)
 
-    def law(self, scene: SceneConfig, law: Following, response: Response, alone: bool = False) -> tuple[int, int]:
+    def law(
+        self, scene: SceneConfig, law: Following, response: Response, alone: bool = False, of_point: bool = False
+    ) -> tuple[int, int]:
         """Return the numbers of the laws for mean and gradient of a response, the latter −1 without one; equal laws
-        share one, unless it is for one element `alone`, which light reaches differently.
+        share one, unless it is for one element `alone`, which light reaches differently, or that of a profile's point.
         """
         followed = list(scene.stimuli).index(law.stimulus), response.lags, response.varied
         laws = [(response.mean, law.gain, response.mean_reference, law.limit)]
         if response.gradient:
             laws.append((response.gradient, law.gain, response.gradient_reference, law.limit))
-        for number, (at, *others) in enumerate(self.laws if not alone else ()):
+        for number, (at, *others) in enumerate(self.laws if not (alone or of_point) else ()):
             if self.fields[at] == followed and tuple(others) == laws[0]:
                 return number, number + 1 if response.gradient else -1
-        shared = response.gradient and not alone and followed in self.fields
+        shared = (response.gradient or of_point) and not alone and followed in self.fields
         field = self.fields.index(followed) if shared else len(self.fields)
         if not shared:
             self.fields.append(followed)

@@ -12,7 +12,7 @@ from bilayer_core.model.findings import Figure
 from bilayer_core.model.plate_section import PlateSection, is_plate, plate_section
 from bilayer_core.model.plate_strip import StripLaw, folding_ratio
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.scene.diffusion_modes import strain_at
+from bilayer_core.scene.diffusion_modes import strains_at
 from bilayer_core.scene.profile import Profile
 from bilayer_core.scene.rod import Rod
 
@@ -60,7 +60,7 @@ def _swells_to(scene: SceneConfig, rod: Rod, plate: PlateSection) -> tuple[float
         natural = plate.natural(slot)
         for law in layer.eigenstrain:
             channel = scene.stimuli[law.stimulus]
-            strain = max(strain_at(rod, layer, law, np.array([channel.minimum, channel.maximum])), key=abs)
+            strain = max(strains_at(rod, layer, law, np.array([channel.minimum, channel.maximum])).ravel(), key=abs)
             found += strain * natural.along, strain * natural.twist, abs(strain * natural.across)
     return tuple(found.tolist())
 

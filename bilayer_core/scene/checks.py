@@ -7,7 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from bilayer_core.scene.diffusion_modes import strain_at
+from bilayer_core.scene.diffusion_modes import strain_at, strains_at
 from bilayer_core.scene.eigenstrain import Eigenstrain
 from bilayer_core.scene.faults import ROUNDING, Fault, Location, one_of, repeated
 from bilayer_core.scene.limits import faults_of_size
@@ -203,7 +203,9 @@ def _least_strain(scene: SceneConfig, rod: Rod, layer: Layer, laws: list[Eigenst
     for (name, _), group in together.items():
         channel = scene.stimuli[name]
         values = np.linspace(channel.minimum, channel.maximum, SAMPLES)
-        total += np.outer(layer.multiples, sum(strain_at(rod, layer, law, values) for law in group)).min(axis=1)
+        multiples = np.array(layer.multiples)[:, None, None]
+        least = sum((multiples * strains_at(rod, layer, law, values)).min(axis=1) for law in group)
+        total += least.min(axis=1)
     return float(total.min())
 
 

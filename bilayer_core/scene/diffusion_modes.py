@@ -122,8 +122,15 @@ def responses(rod: Rod, layer: Layer, law: Following) -> list[Response]:
     return [_response(part, layer, law) for part in made]
 
 
+def strains_at(rod: Rod, layer: Layer, law: Following, stimulus: Array) -> Array:
+    """Return the mean eigenstrains of a layer by the bounds of a law where it has long had a stimulus all along the
+    rod, shape (n_bound, n).
+    """
+    return np.array([strain_at(rod, layer, bound, stimulus) for bound in law.bounds])
+
+
 def strain_at(rod: Rod, layer: Layer, law: Following, stimulus: Array) -> Array:
-    """Return the mean eigenstrain of a layer by a law where it has long had a stimulus all along the rod."""
+    """Return that of a law whose gain is a number."""
     field = rod.diffusion_of(layer, law)
     if field is None:
         return law.strain_at(stimulus)

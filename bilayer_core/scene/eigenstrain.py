@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
 from bilayer_core.scene.faults import Fault, one_of, refuse_all
 from bilayer_core.scene.part import Part
+from bilayer_core.scene.profile import Profile, extremes, varying
 from bilayer_core.scene.units import (
     NonNegativeLength,
     NonNegativeTime,
@@ -100,6 +101,11 @@ class Following(Part):
         return strain if self.saturation is None else self.saturation * np.tanh(strain / self.saturation)
 
     @property
+    def bounds(self) -> tuple[Self, ...]:
+        """Laws with a gain alike all along the rod, between which this one is everywhere."""
+        return (self,)
+
+    @property
     def limit(self) -> float:
         """Saturation, infinite without one."""
         return math.inf if self.saturation is None else self.saturation
@@ -122,9 +128,10 @@ class Eigenstrain(Following):
 
     law: Literal[*LAWS] | None = Field(None, exclude=True)
     """Ready-made numbers for keys that are not given; see docs/stimuli.md."""
-    gain: Number
+    gain: varying(Number)
     """Eigenstrain per unit of the stimulus, near `reference`; may be left out where `law` is given. The laws of
-    a layer together must leave it a length: above −1 over the ranges of their channels."""
+    a layer together must leave it a length: above −1 over the ranges of their channels. A profile takes no
+    `saturation`."""
     interval: tuple[NonNegativeLength, PositiveLength] | None = None
     """From and to, as lengths along the path [m]; default: the whole layer."""
 
@@ -141,3 +148,35 @@ class Eigenstrain(Following):
         if "time_constant" in data:
             numbers = {key: number for key, number in numbers.items() if not key.startswith("time_constant")}
         return handler({**numbers, **data, "law": None})
+
+    def _faults(self) -> Iterator[Fault]:
+        yield from super()._faults()
+        if isinstance(self.gain, Profile) and self.saturation is not None:
+            yield ("saturation",), self.saturation, "must be left out where `gain` is a profile"
+
+    @property
+    def bounds(self) -> tuple[Self, ...]:
+        """Laws with a gain alike all along the rod, between which this one is everywhere."""
+        if not isinstance(self.gain, Profile):
+            return (self,)
+        return tuple(self.model_copy(update={"gain": gain}) for gain in extremes(self.gain))
+
+    def at_points(self, length: float) -> list[tuple[Self, Profile | None]]:
+        """Return a law for each point of the gain's profile, where it acts on a path of a length [m], and the part of
+        it that acts there: a hat from the point before to the point after. A gain that is a number has one law, which
+        acts in full.
+        """
+        if not isinstance(self.gain, Profile) or len(self.gain.at) == 1:
+            return [(self.bounds[0], None)]
+        at: list[float] = self.gain.at
+        laws: list[tuple[Self, Profile | None]] = []
+        first, last = self.interval or (0.0, length)
+        for k, gain in enumerate(self.gain.value):
+            near = slice(max(k - 1, 0), k + 2)
+            begin, end = (at[k - 1] if k else first), (at[k + 1] if k + 1 < len(at) else last)
+            span = max(first, begin), min(last, end)
+            if span[0] >= span[1]:
+                continue
+            hat = Profile.model_construct(at=at[near], value=[float(place == at[k]) for place in at[near]])
+            laws.append((self.model_copy(update={"gain": gain, "interval": span}), hat))
+        return laws

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,7 +67,7 @@ class Override:
             If the path does not exist; says what there is instead.
         """
         holder, place = self.find(data)
-        holder[place] = self.value
+        holder[place] = deepcopy(self.value)  # later changes may be of parts of it
 
 
 def read_overrides(overrides: Overrides) -> list[Override]:

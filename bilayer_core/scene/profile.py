@@ -22,6 +22,9 @@ class Profile(Part, Generic[Value]):
     value: list[Value] = Field(min_length=1)
     """As many as there are places."""
 
+    def __hash__(self) -> int:
+        return hash((*self.at, *self.value))
+
     @classmethod
     def model_parametrized_name(cls, params: tuple[Any, ...]) -> str:
         """Return the title in the JSON Schema."""
@@ -94,11 +97,11 @@ def means_between(number_or_profile: float | Profile, begin: np.ndarray, end: np
     return (area(end) - area(begin)) / (end - begin)
 
 
-def doubled(number_or_profile: float | Profile) -> float | Profile:
-    """Return twice a number or a profile."""
+def scaled(number_or_profile: float | Profile, by: float) -> float | Profile:
+    """Return a multiple of a number or a profile."""
     if isinstance(number_or_profile, Profile):
-        return number_or_profile.model_copy(update={"value": [2.0 * value for value in number_or_profile.value]})
-    return 2.0 * number_or_profile
+        return number_or_profile.model_copy(update={"value": [by * value for value in number_or_profile.value]})
+    return by * number_or_profile
 
 
 def extremes(number_or_profile: float | Profile) -> tuple[float, float]:

@@ -21,7 +21,7 @@ from bilayer_core.scene.part import AngularVelocity, Direction, Name, Part, Velo
 from bilayer_core.scene.paths import ArcPath, Frames, HelixPath, SpiralPath, StraightPath
 from bilayer_core.scene.pattern import Patterns, Placement, pair_at_one_place, placed, stacked
 from bilayer_core.scene.point_paths import PolylinePath, SplinePath
-from bilayer_core.scene.profile import Profile, doubled, extremes, values_at, varying
+from bilayer_core.scene.profile import Profile, extremes, scaled, values_at, varying
 from bilayer_core.scene.units import (
     Angle,
     Curvature,
@@ -113,7 +113,9 @@ class Layer(Part):
         `channels` maps the present channels to the new ones.
         """
         laws = [
-            law.model_copy(update={"stimulus": channels.get(law.stimulus, law.stimulus), "gain": gain * law.gain})
+            law.model_copy(
+                update={"stimulus": channels.get(law.stimulus, law.stimulus), "gain": scaled(law.gain, gain)}
+            )
             for law in self.eigenstrain
         ]
         change = self.stiffness_change
@@ -378,6 +380,7 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
         faults += _profiles(layer, ("layers", index), VARYING, rod.path.length)
         for number, law in enumerate(layer.eigenstrain):
             where: Location = ("layers", index, "eigenstrain", number, "interval")
+            faults += _profiles(law, where[:-1], ("gain",), rod.path.length)
             if law.interval is not None and not is_ordered(law.interval):
                 faults.append((where, law.interval, ordered))
             elif not rod.driven_edges(layer, law):
@@ -426,7 +429,7 @@ def _sections(rod: Rod) -> Iterator[Fault]:
         return
     for where, width in own:
         yield where, width, "must be left out: the rod has a `radius`"
-    diameter = doubled(rod.radius)
+    diameter = scaled(rod.radius, 2.0)
     for where, part, key in layers:
         if getattr(part, key) not in (None, diameter):
             yield (*where, key), getattr(part, key), "must be left out: the rod has a `radius`"
@@ -621,7 +624,9 @@ def _sharp_bends(rod: Rod) -> Iterator[Fault]:
         yield ("path", key), radius if key == "points" else getattr(rod.path, key), demand
 
 
-def _profiles(part: Rod | Layer, where: Location, keys: tuple[str, ...], length: float) -> Iterator[Fault]:
+def _profiles(
+    part: Rod | Layer | Eigenstrain, where: Location, keys: tuple[str, ...], length: float
+) -> Iterator[Fault]:
     """Yield a fault for each place of a profile that lies beyond the end of a path of given length [m]."""
     for key in keys:
         profile = getattr(part, key)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
@@ -15,6 +16,7 @@ from bilayer_core.engine.energy_account import OPEN, QUESTIONED
 from bilayer_core.errors import InputError
 from bilayer_core.forces.force_register import memory_size
 from bilayer_core.integrators.integrator_register import INTEGRATORS
+from bilayer_core.log.run.quantities import entries
 from bilayer_core.model.build_model import build_model
 from bilayer_core.model.findings import told
 from bilayer_core.model.fingerprint import conditions_of, fingerprint_of
@@ -28,12 +30,14 @@ from bilayer_core.observed.inputs import RESET, Input
 from bilayer_core.observed.observer import Observer
 from bilayer_core.printable import html_table
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.scene.loader import load_scene
+from bilayer_core.scene.loader import load_content, load_scene, scene_content
 from bilayer_core.simulation.capture import make_frame
 from bilayer_core.simulation.controls import Controls
 from bilayer_core.simulation.energy_budget import EnergyLedger
 from bilayer_core.simulation.equilibrium import StaticReport, solve_static
 from bilayer_core.simulation.friction_changes import coefficients
+from bilayer_core.simulation.gains import alike_but_gains, put_gains
+from bilayer_core.simulation.gradient import Equilibrium, Gradient, differentiate
 from bilayer_core.simulation.momentum import angular_momentum_of, momentum_of
 from bilayer_core.simulation.observation import (
     describe,
@@ -187,8 +191,11 @@ class Simulator:
         return self._stepper_of(self.model if same else build_model(self.scene, self.plan.model, dimension))
 
     def _initial_state(self) -> State:
-        marks = self._fingerprint, memory_size(self.model), self._conditions
-        return initial_state(self.model, self._keeps_history, *marks)
+        return self._state_of(self.model)
+
+    def _state_of(self, model: Model) -> State:
+        """Return the first state of the model, or of one with other numbers in its scene."""
+        return initial_state(model, self._keeps_history, self._fingerprint, memory_size(model), self._conditions)
 
     def _note_start(self) -> None:
         com = center_of_mass(self.model, self._state)
@@ -389,6 +396,46 @@ class Simulator:
             given without a value; nothing is changed then.
         """
         self._controls.set_stimulus(channel, value, over=over)
+
+    def set_gains(self, gains: Mapping[str, Any]) -> None:
+        """Give eigenstrains other gains, from the next step on; nothing is built anew.
+
+        Parameters
+        ----------
+        gains : mapping of str to object
+            Values by the paths of gains in the scene, or of numbers of their profiles: a number, or a profile with as
+            many points: ``{"rods.strip.layers.active.eigenstrain.gain": 0.02}``.
+
+        Raises
+        ------
+        InputError
+            If more would change than gains, as the number of points, or somebody observes the run: a log is of one
+            scene. Nothing is changed then.
+        """
+        if self._controls.listeners or self._loop.attached:
+            raise InputError("set_gains: takes no other gains while a log or an observer is attached; detach it first")
+        scene = load_content(scene_content(self.scene), gains)
+        other = build_model(scene, self.plan.model, self.plan.dimension)
+        paths = ", ".join(gains)
+        if not (all(re.search(r"\.gain(\.|$)", path) for path in gains) and alike_but_gains(self.model, other)):
+            raise InputError(
+                f"set_gains: {paths}: changes more than gains; allowed are numbers for numbers, and profiles with as "
+                "many points as before, each of its own law; else make a new Simulator"
+            )
+
+        def take(stepper: Stepper) -> None:
+            put_gains(stepper.model, other.drives.law_gain)
+            stepper.take_scene(scene, self.steps, scene.solver.max_newton_iterations)
+
+        take(self._stepper)
+        self.scene, self.model = scene, self._stepper.model
+        if self.plane_watch is not None:
+            self.plane_watch.take_scene(scene.duration, take)
+        self._fingerprint = fingerprint_of(scene, self.plan.model, self.plan.integrator if self._keeps_history else "")
+        self._conditions = float(conditions_of(scene))
+        self._state.fingerprint[:], self._state.conditions[:] = self._fingerprint, self._conditions
+        self._state.has_history.fill(0.0)  # accelerations jump
+        self._stepper.restart(self._state)
 
     def set_load(self, name: str, factor: float | None, *, over: float = 0.0) -> None:
         """Multiply force and moment of a load by a factor from the next step on.
@@ -640,6 +687,48 @@ class Simulator:
                 return solve_static(self._stepper, self._state, tolerance, self._in_space)
             finally:
                 self._loop.take_state()
+
+    def gradient(self, of: str | Sequence[str], to: str | Sequence[str]) -> Gradient:
+        """Return derivatives of the equilibrium at which the robot is; see `simulation.gradient`.
+
+        Parameters
+        ----------
+        of : str or sequence of str
+            Quantities by the names that logs have: ``"com"``, ``"rod/strip/laminate/position"``, ``"energy/bending"``,
+            ``"body/wall/clamp_wrench"``.
+        to : str or sequence of str
+            Channels of stimuli, and paths of numbers in the scene, or of lists of numbers, as ``--set`` takes them:
+            ``"materials.gel.youngs_modulus"``.
+
+        Returns
+        -------
+        Gradient
+            Arrays by quantity and parameter: ``found["com", "humidity"]``.
+
+        Raises
+        ------
+        InputError
+            If the robot is not at rest, there is no such quantity or parameter, or a parameter acts on nothing.
+        SimulationError
+            If the equilibrium is unstable.
+        """
+        here = self._equilibrium()
+        asked = [[names] if isinstance(names, str) else list(names) for names in (of, to)]
+        known = [
+            entry
+            for entry in entries(self.description, self.energy(), ())
+            if not entry.name.startswith("stimulus/") and not entry.name.endswith("/frame")
+        ]
+        return differentiate(here, known, *asked)
+
+    def _equilibrium(self) -> Equilibrium:
+        """Return the equilibrium at which the robot is, with the factor of its Hessian, for studies; see `gradient`."""
+        self.compile()
+
+        def model_of(scene: SceneConfig) -> Model:
+            return build_model(scene, self.plan.model, self.plan.dimension)
+
+        return Equilibrium(self._stepper, self._state, model_of, self._stepper_of, self._state_of)
 
     def save_state(self) -> Array:
         """Return a flat copy of the state; `load_state` continues from it bit for bit.

@@ -11,7 +11,7 @@ from bilayer_core.errors import SceneError
 from bilayer_core.log.run.run_data import RunData
 from bilayer_core.observed.frame import Description
 from bilayer_core.scene.config import SceneConfig
-from bilayer_core.scene.diffusion_modes import strain_at
+from bilayer_core.scene.diffusion_modes import strains_at
 from bilayer_core.scene.loader import parse_scene
 from bilayer_core.view.arrows import reaction_references
 from bilayer_core.view.colouring import STRAIN, Colouring, choose_colouring, colouring_up_to
@@ -107,7 +107,7 @@ def _largest_eigenstrain(scene: SceneConfig | None) -> float:
             for law in layer.eigenstrain:
                 channel = scene.stimuli[law.stimulus]
                 ends = np.array([channel.minimum, channel.maximum])
-                found += np.abs(strain_at(rod, layer, law, ends)).tolist()
+                found += np.abs(strains_at(rod, layer, law, ends)).ravel().tolist()
     return max(of for of in found if np.isfinite(of))
 
 

@@ -61,3 +61,9 @@ def test_an_override_that_cannot_be_is_refused_with_the_reason(override, fault):
     with pytest.raises(SceneError) as refused:
         load_scene(everything(), [override])
     assert fault in str(refused.value)
+
+
+def test_a_change_of_part_of_another_change_leaves_the_callers_list_as_it_is():
+    gravity = [0.0, 0.0, -1.0]
+    assert load_scene("bending", {"gravity": gravity, "gravity.2": -2.0}).gravity == (0.0, 0.0, -2.0)
+    assert gravity == [0.0, 0.0, -1.0]

@@ -9,7 +9,7 @@ from bilayer_core.model.section import sections
 from bilayer_core.scene.body import Prescribed
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.paths import StraightPath
-from bilayer_core.scene.profile import Profile
+from bilayer_core.scene.profile import Profile, values_at
 from bilayer_core.scene.rod import Rod
 from bilayer_core.scene.transduction import free_strain
 from bilayer_core.verification.beam2d.beam import PlanarBeam
@@ -72,8 +72,9 @@ def set_stimuli(beam: PlanarBeam, scene: SceneConfig, values: dict[str, float]) 
         strain = np.zeros(rod.stations - 1)
         for law in layer.eigenstrain:
             limit = np.array([np.inf if law.saturation is None else law.saturation])
-            eigenstrain = free_strain(np.array([values[law.stimulus]]), np.array([law.gain]), law.reference, limit)
-            strain += rod.covered_parts(np.arange(len(strain)), layer, law) * eigenstrain[0]
+            gain = values_at(law.gain, rod.edge_length * (np.arange(len(strain)) + 0.5))
+            eigenstrain = free_strain(np.array([values[law.stimulus]]), gain, law.reference, limit)
+            strain += rod.covered_parts(np.arange(len(strain)), layer, law) * eigenstrain
         stiffness = sections(rod, layer, scene.materials[layer.material], np.zeros(1)).axial_stiffness[0]
         beam.force += stiffness * strain
         beam.moment += stiffness * side * layer.thickness * strain

@@ -1,0 +1,109 @@
+"""Derivatives of equilibria, against differences of equilibria that were found anew, and against closed forms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from bilayer_core.scene.loader import load_scene, scene_content
+from bilayer_core.scene.overrides import read_overrides
+from bilayer_core.simulation.simulator import Simulator
+from bilayer_core.verification.validate.validation_case import Case
+
+TOLERANCE = 1e-14
+"""Displacement that counts as rest [m]."""
+STEP = 2e-4
+"""Of the parameter: differences are of fourth order."""
+HANGING: dict[str, Any] = {"gravity": [0, 0, -9.81]}
+POST = {"name": "post", "type": "sphere", "radius": 0.005, "position": [0.03, 0, -0.0068]}
+ON_A_POST = HANGING | {"obstacles": [POST], "contact": {"barrier_distance": 2e-4, "stiffness": 1e6}}
+ACTIVE = "rods.strip.layers.active"
+
+
+def at_rest(name: str, overrides: dict[str, Any], stimuli: dict[str, float]) -> Simulator:
+    """Return a simulator of a bundled scene in equilibrium."""
+    simulator = Simulator(load_scene(name, overrides))
+    for channel, value in stimuli.items():
+        simulator.set_stimulus(channel, value)
+    simulator.solve_static(TOLERANCE)
+    return simulator
+
+
+def height(name: str, overrides: dict[str, Any], stimuli: dict[str, float], to: str) -> Callable:
+    """Measure how the height of the mass centre depends on a parameter."""
+
+    def measured() -> tuple[float, float]:
+        here = at_rest(name, overrides, stimuli)
+        if to in stimuli:
+            value = stimuli[to]
+        else:
+            holder, place = read_overrides({to: 0.0})[0].find(scene_content(here.scene))
+            value = holder[place]
+        h = STEP * abs(value)
+
+        def at(k: float) -> float:
+            other = {to: value + k * h}
+            own = (overrides, stimuli | other) if to in stimuli else (overrides | other, stimuli)
+            return float(at_rest(name, *own).com[2])
+
+        a, b, c, d = map(at, (-1.0, -0.5, 0.5, 1.0))
+        return float(here.gradient("com", to)["com", to][2]), (8.0 * (c - b) - (d - a)) / (6.0 * h)
+
+    return measured
+
+
+def curvature_per_swelling() -> tuple[float, float]:
+    """Measure how the curvature of a free bilayer depends on the stimulus, in the middle, in 1/m."""
+    simulator = at_rest("bending", {}, {"swelling": 0.6})
+    found = simulator.gradient("rod/strip/laminate/curvature", "swelling")
+    return abs(float(found["rod/strip/laminate/curvature", "swelling"][20])), 1.5 * 0.01 / 2e-3
+
+
+def weight_by_density() -> tuple[float, float]:
+    """Measure how the force on a clamp depends on the density of what hangs from it."""
+    simulator = at_rest("cantilever", {}, {})
+    found = simulator.gradient("body/wall/clamp_wrench", "materials.gel.density")
+    rod = simulator.scene.rods[0]
+    volume = rod.path.length * rod.width * rod.layers[0].thickness
+    return float(found["body/wall/clamp_wrench", "materials.gel.density"][2]), -9.81 * volume
+
+
+def error_of_a_list() -> tuple[float, float]:
+    """Measure the sum of the derivatives by both ends of a profile of gains, over that by a gain which is a number."""
+    profile = {f"{ACTIVE}.eigenstrain.gain": {"at": [0, 0.1], "value": [0.01, 0.01]}}
+    names = f"{ACTIVE}.eigenstrain.gain.value", f"{ACTIVE}.eigenstrain.gain"
+    of_points = at_rest("bending", HANGING | profile, {"swelling": 0.6}).gradient("com", names[0])
+    whole = at_rest("bending", HANGING, {"swelling": 0.6}).gradient("com", names[1])
+    return float(np.sum(of_points["com", names[0]][2])), float(whole["com", names[1]][2])
+
+
+IN_SPACE, TWO_RODS, STRIP = {"solver.dimension": 3}, {"solver.model": "two_rod"}, {"rods.strip.section": "strip"}
+SWOLLEN, DIFFERENCES = {"swelling": 0.6}, "differences of equilibria"
+ANEW = {
+    "stimulus": ("bending", HANGING, SWOLLEN, "swelling"),
+    "gain": ("bending", HANGING, SWOLLEN, f"{ACTIVE}.eigenstrain.gain"),
+    "modulus": ("bending", HANGING, SWOLLEN, "materials.active.youngs_modulus"),
+    "length": ("bending", HANGING, SWOLLEN, "rods.strip.path.length"),
+    "thickness": ("bending", HANGING, SWOLLEN, f"{ACTIVE}.thickness"),
+    "in space/stimulus": ("bending", HANGING | IN_SPACE, SWOLLEN, "swelling"),
+    "in space/thickness": ("bending", HANGING | IN_SPACE, SWOLLEN, f"{ACTIVE}.thickness"),
+    "two rods/stimulus": ("bending", HANGING | TWO_RODS, SWOLLEN, "swelling"),
+    "two rods/length": ("bending", HANGING | TWO_RODS, SWOLLEN, "rods.strip.path.length"),
+    "strip/stimulus": ("bending", HANGING | STRIP, {"swelling": 0.1}, "swelling"),
+    "helix/gravity": ("helix", {"gravity": [0, 0, -0.2]}, {}, "gravity.2"),
+    "gripper/density": ("gripping", {}, {"humidity": 0.8}, "materials.film.density"),
+}
+TOUCHING = {
+    "contact/stimulus": ("bending", ON_A_POST, {"swelling": 0.03}, "swelling"),
+    "contact/thickness": ("bending", ON_A_POST, {"swelling": 0.03}, f"{ACTIVE}.thickness"),
+    "contact/radius": ("bending", ON_A_POST, {"swelling": 0.03}, "obstacles.post.radius"),
+}
+CASES = (
+    *(Case(f"gradients/{name}", DIFFERENCES, 1e-6, height(*of)) for name, of in ANEW.items()),
+    *(Case(f"gradients/{name}", DIFFERENCES, 1e-4, height(*of)) for name, of in TOUCHING.items()),
+    Case("gradients/curvature by the stimulus", "Timoshenko's formula", 1e-3, curvature_per_swelling, "1/m"),
+    Case("gradients/reaction by density", "g V", 1e-6, weight_by_density, "N m³/kg"),
+    Case("gradients/points of a profile", "the gradient by a number", 1e-8, error_of_a_list, "m"),
+)

@@ -1,0 +1,178 @@
+"""Patterns that are found from wanted shapes."""
+
+import csv
+import math
+
+import numpy as np
+import pytest
+import yaml
+
+from bilayer_core import Simulator, design, load_scene
+from bilayer_core.cli import main
+from bilayer_core.errors import InputError, SceneError
+from bilayer_core.studies.shaping.target_curve import TargetCurve, between, read_curve
+
+GAIN = "rods.strip.layers.active.eigenstrain.gain"
+HANGING, LENGTH = {"gravity": [0, 0, -9.81]}, 0.1
+PLACES = np.linspace(0.0, LENGTH, 100)
+PATTERN = 0.01 + 0.02 * np.sin(2.0 * np.pi * PLACES / LENGTH)
+
+
+def curve_of(overrides, stimulus=1.0):
+    """The curve between the strands of a strip, in equilibrium."""
+    simulator = Simulator(load_scene("bending", overrides))
+    simulator.set_stimulus("swelling", stimulus)
+    simulator.solve_static()
+    strands = {strand.name: strand.nodes for strand in simulator.description.strands}
+    return np.mean([simulator.positions[nodes] for nodes in strands.values()], axis=0)
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    """What two rods with a known pattern make at four times the stations."""
+    profile = {"at": PLACES.tolist(), "value": PATTERN.tolist()}
+    return curve_of(HANGING | {"solver.model": "two_rod", "rods.strip.stations": 401, GAIN: profile})
+
+
+def test_the_pattern_that_made_a_shape_is_found_in_few_equilibria(drawn):
+    beam = HANGING | {"rods.strip.stations": 101, "rods.strip.section": "beam"}  # as those two rods are
+    found = design(load_scene("bending", beam), drawn, {GAIN: (-0.05, 0.05, 100)})
+    assert found.equilibria <= 6
+    assert found.largest < 1e-3
+    assert np.abs(found.values[0] - PATTERN).max() < 0.01 * np.abs(PATTERN).max()
+    assert found.shapes[0].stable and found.at_bounds == 0
+
+
+def test_the_scene_that_is_found_makes_the_shape_that_is_reported(drawn):
+    found = design("bending", drawn, {GAIN: (-0.05, 0.05, 20)}, overrides=HANGING)
+    own = found.scene.rods[0].layers[1].eigenstrain[0].gain
+    again = curve_of(HANGING | {GAIN: {"at": own.at, "value": own.value}})
+    assert np.abs(again - found.shapes[0].made).max() < 1e-9
+
+
+def test_one_pattern_serves_two_shapes_at_two_stimuli():
+    profile = {"at": [0, 0.05, 0.1], "value": [0.01, -0.02, 0.03]}
+    levels = ({"swelling": 0.4}, {"swelling": 1.0})
+    curves = [curve_of(HANGING | {GAIN: profile}, level["swelling"]) for level in levels]
+    found = design("bending", curves, {GAIN: (-0.05, 0.05, 3)}, at=levels, overrides=HANGING)
+    assert found.values[0] == pytest.approx(profile["value"], abs=1e-4)
+    assert len(found.shapes) == 2
+
+
+def test_bounds_that_limit_a_shape_are_reported_with_the_distance():
+    profile = {"at": [0, 0.1], "value": [0.03, 0.03]}
+    found = design("bending", curve_of({GAIN: profile}), {GAIN: (-0.01, 0.01, 10)})
+    assert found.at_bounds == 10
+    assert found.largest > 0.05
+    assert found.values[0] == pytest.approx(0.01)
+
+
+def test_a_strip_lies_on_a_post_with_a_pattern_that_is_found_through_contact():
+    post = {"name": "post", "type": "sphere", "radius": 0.005, "position": [0.03, 0, -0.0068]}
+    touching = HANGING | {"obstacles": [post], "contact": {"barrier_distance": 2e-4, "stiffness": "1 MPa"}}
+    wanted = curve_of(touching | {GAIN: {"at": [0, 0.05, 0.1], "value": [0.0, 0.01, 0.0]}})
+    found = design("bending", wanted, {GAIN: (-0.03, 0.03, 3)}, overrides=touching)
+    assert found.largest < 1e-4
+    assert found.values[0] == pytest.approx([0.0, 0.01, 0.0], abs=1e-3)
+
+
+def test_thickness_of_a_layer_is_a_pattern_too():
+    wanted = curve_of({"rods.strip.layers.active.thickness": 1.3e-3})
+    found = design("bending", wanted, {"rods.strip.layers.active.thickness": (0.5e-3, 2e-3)})
+    assert found.values[0] == pytest.approx([1.3e-3], rel=1e-2)
+
+
+def test_an_error_of_one_percent_moves_the_rod_as_reported(drawn):
+    found = design("bending", drawn, {GAIN: (-0.05, 0.05, 20)}, overrides=HANGING)
+    own = found.scene.rods[0].layers[1].eigenstrain[0].gain
+    more = curve_of(HANGING | {GAIN: {"at": own.at, "value": [1.01 * gain for gain in own.value]}})
+    moved = np.linalg.norm(more - found.shapes[0].made, axis=1).max()
+    assert found.sensitivity[GAIN] == pytest.approx(moved, rel=0.02)
+    path = "rods.strip.layers.passive.thickness"
+    thicker = curve_of(HANGING | {GAIN: {"at": own.at, "value": own.value}, path: 1.01e-3})
+    moved = np.linalg.norm(thicker - found.shapes[0].made, axis=1).max()
+    assert found.sensitivity[path] == pytest.approx(moved, rel=0.05)
+
+
+def test_a_drawn_curve_has_the_length_and_the_departures_of_its_circle():
+    angle = np.linspace(0.0, math.pi, 40) ** 2 / math.pi  # uneven
+    circle = TargetCurve(np.stack([np.sin(angle), 0.0 * angle, 1.0 - np.cos(angle)], axis=1))
+    assert circle.length == pytest.approx(math.pi, rel=1e-4)
+    beside = np.array([[1.2 * math.sin(1.0), 0.3, 1.0 - 1.2 * math.cos(1.0)]])
+    ways, tangents = circle.departures(beside, np.array([1.3]))
+    assert np.linalg.norm(ways) == pytest.approx(math.hypot(0.2, 0.3), rel=1e-3)
+    assert tangents[0] == pytest.approx([math.cos(1.0), 0.0, math.sin(1.0)], abs=1e-3)
+
+
+def test_shapes_on_the_way_to_a_helix_go_from_the_start_to_the_target():
+    s = np.linspace(0.0, 1.0, 200)
+    straight = np.stack([s, 0.0 * s, 0.0 * s], axis=1)
+    helix = np.stack([s / 2.0**0.5, 0.1 * np.sin(s / 0.1414), 0.1 - 0.1 * np.cos(s / 0.1414)], axis=1)
+    target = TargetCurve(helix)
+    ends = [between(straight, target, part) for part in (0.0, 1.0)]
+    assert np.abs(ends[0].points - straight).max() < 1e-9
+    assert np.abs(ends[1].points - target.at(s * target.length)).max() < 0.02
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        ([[0, 0, 0], [1, 0, 0], [2, 0, 0]], "must be 4 points or more"),
+        ([[0, 0, 0], [1, 0, 0], [1, 0, 0], [2, 0, 0]], "point 3 is that before it"),
+        ([[0, 0, 0], [1, 0, 0], [1, 0, 1], [1, 0, 2]], "has a kink at point 2 .* where it turns by 90°"),
+    ],
+)
+def test_what_is_no_smooth_curve_is_refused(points, message):
+    with pytest.raises(InputError, match=message):
+        TargetCurve(np.array(points, dtype=float))
+
+
+def straight(length, direction=(1.0, 0.0, 0.0)):
+    return np.linspace(0.0, length, 20)[:, None] * np.array(direction)
+
+
+@pytest.mark.parametrize(
+    ("target", "vary", "message"),
+    [
+        (straight(0.2), {GAIN: (-0.1, 0.1)}, "is 200 mm long, the rod 100.5 mm; .* cannot stretch so far"),
+        (straight(0.1, (0.0, 0.0, 1.0)), {GAIN: (-0.1, 0.1)}, "begins 90° from the direction in which the rod begins"),
+        (straight(0.1), {"rods.strip.width": (1e-3, 2e-3)}, "vary rods.strip.width: acts on nothing"),
+        (straight(0.1), {}, "vary: nothing is given"),
+        (straight(0.1), {GAIN: (0.1, -0.1)}, "the lower bound 0.1 must be below the upper one"),
+        (straight(0.1), {GAIN: (-0.1, 0.1, 1)}, "1 points are not allowed; it must be a whole number from 2 up"),
+        (straight(0.1), {"gravity.2": (-1.0, 1.0, 5)}, "points need a number of a rod"),
+        (straight(0.1), {"rods.strip.layers.active.gain": (0, 1)}, "vary rods.strip.layers.active.gain: there is no"),
+        ([straight(0.1)] * 2, {GAIN: (-0.1, 0.1)}, "2 curves need values of stimuli each, 0 are given"),
+    ],
+)
+def test_bad_input_of_a_design_is_refused(target, vary, message):
+    with pytest.raises((InputError, SceneError), match=message):
+        design("bending", target, vary)
+
+
+def test_the_command_writes_scene_pattern_report_and_picture(tmp_path, capsys):
+    wanted = curve_of({GAIN: {"at": [0, 0.1], "value": [0.0, 0.03]}})
+    with open(tmp_path / "curve.csv", "w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow("xyz")
+        rows.writerows(wanted.tolist())
+    out = tmp_path / "made"
+    arguments = ["design", "bending", "--target", str(tmp_path / "curve.csv"), "--target-at", "swelling=1"]
+    assert main([*arguments, "--vary", f"{GAIN}=-5%:5%:6", "--out", str(out), "--quiet"]) == 0
+    assert "the rod 100" in capsys.readouterr().out
+    scene = yaml.safe_load((out / "designed.yaml").read_text())
+    value = scene["rods"][0]["layers"][1]["eigenstrain"]["gain"]["value"]
+    with open(out / "pattern.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["value"]) for row in rows] == value == pytest.approx(np.linspace(0.0, 0.03, 6), abs=5e-4)
+    assert (out / "report.json").exists() and (out / "design.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("a,b\n1,2\n", "must have columns x, y and z"), ("x,y,z\n1,2,\n", "line 2: must have three numbers")],
+)
+def test_a_file_that_holds_no_curve_is_refused(tmp_path, text, message):
+    (tmp_path / "curve.csv").write_text(text)
+    with pytest.raises(InputError, match=message):
+        read_curve(tmp_path / "curve.csv")
