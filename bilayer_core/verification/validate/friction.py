@@ -251,6 +251,11 @@ def _box(begin: float, end: float, name: str = "box") -> dict:
     return {"name": name, "type": "box", "position": place, "size": [end - begin, 0.05, 0.02]}
 
 
+def box_on_ground(end: float) -> tuple[dict, ...]:
+    """Return a box that ends at a place along x [m], and the ground."""
+    return _box(-0.1, end), GROUND
+
+
 def two_boxes(meet: float) -> tuple[dict, ...]:
     """Return two boxes that meet at a place along x [m]."""
     return _box(-0.1, meet), _box(meet, 0.2, "next")
@@ -258,7 +263,7 @@ def two_boxes(meet: float) -> tuple[dict, ...]:
 
 ON_BOXES = {
     "on a box": (_box(-0.1, 0.2),),
-    "from a box onto the ground": (_box(-0.1, 0.0237), GROUND),
+    "from a box onto the ground": box_on_ground(0.0237),
     "from box to box": two_boxes(0.0427),
 }
 """Obstacles under strips that crawl, but for the ground alone. On the ground the box ends away from what rests, since
