@@ -27,8 +27,8 @@ node and turns with the edges there, by a rate that is frozen with the contact (
 semidefinite.
 
 A contact of a rod stands for a stretch of it: half an edge on each side of a station, less where a box or cylinder
-divides edges. Where slip turns round in the stretch of a contact with a flat face, or close by, its load is spread over
-places of that, `PARTS` an edge, for the rest of the stage: slip is linear between stations, and what rests may be
+divides edges. Where slip turns round in a stretch that lies on a flat face, or close by, its load is spread over places
+of that, `PARTS` an edge, for the rest of the stage: slip is linear between stations, and what rests may be
 anywhere. A place slips as fast as the next one within f₁ of a threshold that is widened to the difference of the two,
 so that friction is continuous as what rests moves along: f₁′ falls linearly to 0 there, and such hats add up to 1. (By
 contacts alone the stride of a strip that extends is off by several percent, as its resting point is always one of
@@ -308,6 +308,22 @@ def _on_curve(surfaces, at, i, mix):
     return rod_point(surfaces, at, i, (mix[0], mix[1], 0.0, 0.0, 0.0, 0.0))
 
 
+@kernel
+def _lies_flat(surfaces, strands, stage, i, n, length):
+    """Return whether a stretch about node i rises by less than the barrier distance at the origin of the stage, so that
+    all of it presses.
+    """
+    start = stage.origin_position
+    for side in range(2):
+        e = surfaces.node_edges[i, side]
+        k, rise = strands.edge_node[e], 0.0
+        for c in range(3):
+            rise += n[c] * (start[k + 1, c] - start[k, c])
+        if abs(rise) * length >= surfaces.d_hat * surfaces.edge_length[e]:
+            return False
+    return True
+
+
 @piece(bool, Sliding, Problem, Configuration, Stage)
 def freeze_surface_contacts(sliding, p, at, stage):
     """List the contacts at a configuration, with their normal forces, directions and arms; near pairs are those that
@@ -330,7 +346,7 @@ def freeze_surface_contacts(sliding, p, at, stage):
         same &= sliding.part[count, 0] == part and sliding.part[count, 1] == mix[5]
         sliding.first[count], sliding.surface[count], sliding.node[count] = i, s, node
         sliding.part[count, 0], sliding.part[count, 1] = part, mix[5]
-        sliding.length[count] = surfaces.near_length[k] if a < 0 else 0.0
+        sliding.length[count] = 0.0
         sliding.smooth[count], sliding.last_load[count] = sliding.threshold, sliding.load[count]
         sliding.load[count] = -surfaces.stiffness * weight * barrier_gradient(d, surfaces.d_hat)
         if p.restitution.exists:
@@ -342,6 +358,8 @@ def freeze_surface_contacts(sliding, p, at, stage):
             sliding.normal[count, c], sliding.arm[count, c] = n[c], arm[c]
             sliding.lever[count, c] = touched - at.pose_position[b, c]
         if a < 0:
+            if _lies_flat(surfaces, p.strands, stage, node, n, surfaces.near_length[k]):
+                sliding.length[count] = surfaces.near_length[k]
             write_rate(surfaces, at, node, mix, arm, count, sliding.arm_rate)
         _write_axis(sliding, surfaces, at, count, i, s, node, n)
         count += 1
