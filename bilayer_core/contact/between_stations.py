@@ -51,13 +51,13 @@ DEEPEST = 24
 
 
 @kernel
-def note(surfaces, k, i, s, gap, node, arm, mix, radius, weight):
+def note(surfaces, k, i, s, gap, node, arm, mix, radius, weight, length):
     """Write pair k, if there is capacity for it."""
     if k >= surfaces.near_contact_point.shape[0]:
         return
     surfaces.near_contact_point[k], surfaces.near_surface[k], surfaces.near_gap[k] = i, s, gap
     surfaces.near_node[k], surfaces.near_arm[k] = node, arm
-    surfaces.near_radius[k], surfaces.near_weight[k] = radius, weight
+    surfaces.near_radius[k], surfaces.near_weight[k], surfaces.near_length[k] = radius, weight, length
     for c in range(6):
         surfaces.near_mix[k, c] = mix[c]
 
@@ -86,7 +86,7 @@ def _section_at(surfaces, i, part, single):
 
 
 @kernel
-def _note_between(surfaces, count, i, s, part, gap, mix, across, radius, weight):
+def _note_between(surfaces, count, i, s, part, gap, mix, across, radius, weight, length):
     """Write the pair of a point at the part `across` of the border's arm in a section at a part of the edges at node
     i; one at an end belongs to that.
     """
@@ -95,7 +95,7 @@ def _note_between(surfaces, count, i, s, part, gap, mix, across, radius, weight)
     if abs(part) == 1.0:
         node = i - 1 if part < 0.0 else i + 1
         own = 0.0, 0.0, surfaces.node_part[node, 0], surfaces.node_part[node, 1], mix[4], w
-    note(surfaces, count, node, s, gap, node, True, own, radius, weight)
+    note(surfaces, count, node, s, gap, node, True, own, radius, weight, length)
 
 
 @kernel
@@ -105,8 +105,6 @@ def list_between(surfaces, at, s, limit, pending, count):
     """
     edges, section, divides = surfaces.node_edges, surfaces.section, surfaces.kind[s] == BOX
     divides |= surfaces.kind[s] == CYLINDER
-    for i in range(edges.shape[0]):
-        surfaces.whole[s, i] = False
     for i in range(edges.shape[0]):
         b, a = edges[i, 0], edges[i, 1]
         if not surfaces.node_between[s, i] or not (surfaces.edge_can_collide[s, b] or surfaces.edge_can_collide[s, a]):
@@ -162,11 +160,12 @@ def _list_grid(surfaces, at, s, i, single, ends_before, ends_after, limit, count
             weight = 0.5 * (surfaces.edge_length[b] + surfaces.edge_length[a])
         is_end = abs(j) == parts or (single and j == 0)
         weight *= 0.5 if plane and is_end else (0.5 if is_end else 1.0) / parts
+        length = weight if plane else 0.0
         if surfaces.kind[s] == SPHERE and border > 0.0:
             patch = math.sqrt(2.0 * (surfaces.sharpest[s] + radius) * surfaces.d_hat)
             weight *= max(1.0, border / patch)
         apart = max(spacing, border) if plane else spacing
-        count = _list_across(surfaces, at, s, i, part, mix, apart, radius, weight, limit, count)
+        count = _list_across(surfaces, at, s, i, part, mix, apart, radius, weight, length, limit, count)
     return count
 
 
@@ -181,7 +180,7 @@ def _can_meet(surfaces, s, i, part):
 
 
 @kernel
-def _list_across(surfaces, at, s, i, part, mix, spacing, radius, weight, limit, count):
+def _list_across(surfaces, at, s, i, part, mix, spacing, radius, weight, length, limit, count):
     """List those of one section, whose borders are at ± w of the mix and whose weight together is `weight`.
 
     They lie on a line, along which a gap changes by no more than the way, so points from where it is large are passed.
@@ -199,7 +198,8 @@ def _list_across(surfaces, at, s, i, part, mix, spacing, radius, weight, limit, 
         gap = gap_normal(surfaces, at, radius, s, p[0], p[1], p[2])[0]
         if gap <= limit:
             share = weight if half == 0 else weight * (0.25 if abs(k) == half else 0.5) / half
-            _note_between(surfaces, count, i, s, part, gap, mix, k / half if half > 0 else 0.0, radius, share)
+            across = k / half if half > 0 else 0.0
+            _note_between(surfaces, count, i, s, part, gap, mix, across, radius, share, length)
             count += 1
         k += max(1, int(min((gap - limit) / step, 2.0 * half))) if gap > limit and step > 0.0 else 1
     return count
@@ -260,7 +260,7 @@ def _list_stretch(surfaces, at, s, i, single, middle, inward, weight, flat, limi
     edges = surfaces.node_edges
     longest = max(at.length[edges[i, 0]], at.length[edges[i, 1]])
     pending[0, 0], pending[0, 1], pending[0, 2], pending[0, 3] = middle, 0.5, inward, weight
-    top, is_part = 1, False
+    top = 1
     while top > 0:
         top -= 1
         c, e, inward, left = pending[top, 0], pending[top, 1], pending[top, 2], pending[top, 3]
@@ -276,15 +276,11 @@ def _list_stretch(surfaces, at, s, i, single, middle, inward, weight, flat, limi
                 way = 2.0 * e * longest
             elif not _can_meet(surfaces, s, i, c):
                 break
-            first, listed = count, 0.0 if looks else own + left
+            listed = 0.0 if looks else own + left
             count, sag = _walk_across(
                 surfaces, at, s, i, c, mix, radius, before, after, way, limit, listed, pending, count
             )
             if not looks:
-                if not is_part and first < count <= surfaces.near_weight.shape[0]:
-                    share = (0.25 if mix[5] > 0.0 else 1.0) * listed
-                    ends = min(surfaces.near_weight[first], surfaces.near_weight[count - 1])
-                    surfaces.whole[s, surfaces.near_node[first]] = ends == share
                 break
             share = _share_of_parts(surfaces, sag)
             divides = share > 0.0
@@ -297,7 +293,7 @@ def _list_stretch(surfaces, at, s, i, single, middle, inward, weight, flat, limi
                     pending[top, 0], pending[top, 1] = c + side * 2.0 * e / 3.0, e / 3.0
                     pending[top, 2], pending[top, 3] = 0.0, left if inward == 0.0 else 2.0 * left
                     top += 1
-            e, is_part = e / 3.0, True
+            e /= 3.0
     return count
 
 
@@ -368,7 +364,9 @@ def _walk_across(surfaces, at, s, i, part, mix, radius, before, after, way, limi
                 top += 1
                 continue
             carried = (carried + 0.5 * own) * weight
-            count, sag = _at_place(surfaces, at, s, i, part, mix, radius, before, after, way, limit, v, carried, count)
+            count, sag = _at_place(
+                surfaces, at, s, i, part, mix, radius, before, after, way, limit, v, carried, weight, count
+            )
             largest = max(largest, sag)
             v, gap, slope, carried = end, pending[k, 3], pending[k, 4], 0.5 * own + more
             top -= 1
@@ -376,7 +374,7 @@ def _walk_across(surfaces, at, s, i, part, mix, radius, before, after, way, limi
 
 
 @kernel
-def _at_place(surfaces, at, s, i, part, mix, radius, before, after, way, limit, across, weight, count):
+def _at_place(surfaces, at, s, i, part, mix, radius, before, after, way, limit, across, weight, length, count):
     """List the point at the part `across` of the border's arm, or look at the gap along the rod there; see
     `_walk_across`.
     """
@@ -385,7 +383,7 @@ def _at_place(surfaces, at, s, i, part, mix, radius, before, after, way, limit, 
     gap, n0, n1, n2, _, _, _ = gap_normal(surfaces, at, radius, s, x[0], x[1], x[2])
     if way == 0.0:
         if gap <= limit:
-            _note_between(surfaces, count, i, s, part, gap, mix, across, radius, weight)
+            _note_between(surfaces, count, i, s, part, gap, mix, across, radius, weight, length)
             count += 1
         return count, 0.0
     if gap <= limit + way and way > surfaces.coarsest[i]:

@@ -57,7 +57,7 @@ def list_near(surfaces, at, margin):
         for i in range(group.shape[0]):
             if not can_collide[s, group[i]]:
                 continue
-            node, x, radius = i, (0.0, 0.0, 0.0), surfaces.radius[i]
+            node, x, radius, length = i, (0.0, 0.0, 0.0), surfaces.radius[i], 0.0
             if i < placed:
                 x = row(point, i)
                 if i < nodes:
@@ -83,7 +83,10 @@ def list_near(surfaces, at, margin):
                     if gap <= surfaces.d_hat + margin:
                         continue
                     weight = 0.0
-                note(surfaces, count, i, s, gap, node, i >= placed, mix, radius, weight)
+                if plane and (i < nodes or i >= placed):
+                    b, a = surfaces.node_edges[node, 0], surfaces.node_edges[node, 1]
+                    length = 0.5 * (surfaces.edge_length[a] + (surfaces.edge_length[b] if b != a else 0.0))
+                note(surfaces, count, i, s, gap, node, i >= placed, mix, radius, weight, length)
                 count += 1
         if between:
             count = list_between(surfaces, at, s, surfaces.d_hat + margin, pending, count)

@@ -26,12 +26,13 @@ points are one, on the face of the body or rod, x − r n, and so the moments ca
 node and turns with the edges there, by a rate that is frozen with the contact (`forces.rod_arms`). F is positive
 semidefinite.
 
-A station of a rod stands for half an edge on each side. Where the slip of two neighbouring stations that press on one
-flat face turns round between them, or close by, their shares of that edge are spread over `PARTS` places of it for the
-rest of the stage: slip is linear between stations, and what rests may be anywhere. A place slips as fast as the next
-one within f₁ of a threshold that is widened to the difference of the two, so that friction is continuous as what rests
-moves along: f₁′ falls linearly to 0 there, and such hats add up to 1. (By stations alone the stride of a strip that
-extends is off by several percent, as its resting point is always a station.)
+A contact of a rod stands for a stretch of it: half an edge on each side of a station, less where a box or cylinder
+divides edges. Where slip turns round in a stretch that lies on a flat face, or close by, its load is spread over places
+of that, `PARTS` an edge, for the rest of the stage: slip is linear between stations, and what rests may be
+anywhere. A place slips as fast as the next one within f₁ of a threshold that is widened to the difference of the two,
+so that friction is continuous as what rests moves along: f₁′ falls linearly to 0 there, and such hats add up to 1. (By
+contacts alone the stride of a strip that extends is off by several percent, as its resting point is always one of
+them.)
 
 Contacts are frozen at the start of a stage, and anew at each minimum of the potential, until that minimum stays: so λ,
 n and a are those of the stage's own end, without which integrators lose their order. The normal force that λ makes
@@ -48,7 +49,6 @@ import math
 from bilayer_core.contact.barrier import barrier_gradient
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
 from bilayer_core.contact.gap import gap_normal, mix_of, place_of, rod_point
-from bilayer_core.contact.shapes import PLANE
 from bilayer_core.forces.contact_on_bodies import add_force, add_second_derivative
 from bilayer_core.forces.restitution import damping_at
 from bilayer_core.forces.rod_arms import (
@@ -77,15 +77,13 @@ LEAST_RELAXATION, LARGEST_RELAXATION = 0.3, 3.0
 PARTS = 8
 """Places of an edge at which it slides where its slip turns round."""
 MOST_PLACES = 256 * PARTS
-"""Of rods, at most: where slip turns round in more edges than that, the others slide at stations alone."""
+"""Of rods, at most: where slip turns round in more stretches than that, the others slide at their contacts alone."""
 BESIDE = 0.5
-"""How far beside an edge slip may turn round for it to have such places, in its own length."""
+"""How far beside a stretch slip may turn round for it to have such places, as a part of an edge."""
 ALIKE = 0.25
 """Part of the slip within which a contact sticks by which slips may differ without friction that does."""
-SAME_FACE = 1e-9
-"""Of the cosine between the normals of two contacts on one face: what rounding leaves."""
-SAME_SECTION = 4
-"""Contacts of a rod and surface at most from one station to the same place of the next one's section."""
+ROUNDING = 1e-9
+"""Of a number of places."""
 
 
 @kernel
@@ -310,6 +308,22 @@ def _on_curve(surfaces, at, i, mix):
     return rod_point(surfaces, at, i, (mix[0], mix[1], 0.0, 0.0, 0.0, 0.0))
 
 
+@kernel
+def _lies_flat(surfaces, strands, stage, i, n, length):
+    """Return whether a stretch about node i rises by less than the barrier distance at the origin of the stage, so that
+    all of it presses.
+    """
+    start = stage.origin_position
+    for side in range(2):
+        e = surfaces.node_edges[i, side]
+        k, rise = strands.edge_node[e], 0.0
+        for c in range(3):
+            rise += n[c] * (start[k + 1, c] - start[k, c])
+        if abs(rise) * length >= surfaces.d_hat * surfaces.edge_length[e]:
+            return False
+    return True
+
+
 @piece(bool, Sliding, Problem, Configuration, Stage)
 def freeze_surface_contacts(sliding, p, at, stage):
     """List the contacts at a configuration, with their normal forces, directions and arms; near pairs are those that
@@ -328,9 +342,11 @@ def freeze_surface_contacts(sliding, p, at, stage):
             continue
         a, b, node, mix = surfaces.contact_point_body[i], surfaces.body[s], surfaces.near_node[k], mix_of(surfaces, k)
         same &= count < sliding.count[0] and sliding.first[count] == i and sliding.surface[count] == s
-        same &= sliding.part[count, 0] == mix[1] and sliding.part[count, 1] == mix[5]
+        part = mix[0] + mix[1]
+        same &= sliding.part[count, 0] == part and sliding.part[count, 1] == mix[5]
         sliding.first[count], sliding.surface[count], sliding.node[count] = i, s, node
-        sliding.part[count, 0], sliding.part[count, 1] = mix[1], mix[5]
+        sliding.part[count, 0], sliding.part[count, 1] = part, mix[5]
+        sliding.length[count] = 0.0
         sliding.smooth[count], sliding.last_load[count] = sliding.threshold, sliding.load[count]
         sliding.load[count] = -surfaces.stiffness * weight * barrier_gradient(d, surfaces.d_hat)
         if p.restitution.exists:
@@ -342,11 +358,13 @@ def freeze_surface_contacts(sliding, p, at, stage):
             sliding.normal[count, c], sliding.arm[count, c] = n[c], arm[c]
             sliding.lever[count, c] = touched - at.pose_position[b, c]
         if a < 0:
+            if _lies_flat(surfaces, p.strands, stage, node, n, surfaces.near_length[k]):
+                sliding.length[count] = surfaces.near_length[k]
             write_rate(surfaces, at, node, mix, arm, count, sliding.arm_rate)
         _write_axis(sliding, surfaces, at, count, i, s, node, n)
         count += 1
     whole = count
-    if count > 1 and sliding.spreads:
+    if sliding.spreads:
         count = _spread(sliding, p, at, stage, count)
         for k in range(whole, count):
             same &= sliding.same[k]
@@ -356,129 +374,115 @@ def freeze_surface_contacts(sliding, p, at, stage):
 
 
 @kernel
-def _next_station(sliding, surfaces, strands, k, count):
-    """Return the contact of the next station of a rod with the same surface, at the same place of its section; −1
-    without one.
-    """
-    i, w = sliding.node[k], sliding.part[k, 1]
-    if strands.edge_node[surfaces.node_edges[i, 1]] != i:  # the end of a rod
+def _project(sliding, k, x):
+    """Project a vector onto the tangent plane of a contact."""
+    n = sliding.normal
+    along = x[0] * n[k, 0] + x[1] * n[k, 1] + x[2] * n[k, 2]
+    for c in range(3):
+        x[c] -= along * n[k, c]
+
+
+@kernel
+def _edge_beside(surfaces, strands, i, part, side):
+    """Return the edge on one side of a part of the edges at node i; −1 beyond the end of a rod."""
+    before, after = surfaces.node_edges[i, 0], surfaces.node_edges[i, 1]
+    if part == 0.0 and before == after and (strands.edge_node[after] == i) == (side < 0):
         return -1
-    for j in range(k + 1, min(k + SAME_SECTION, count)):
-        if sliding.surface[j] != sliding.surface[k] or surfaces.contact_point_body[sliding.first[j]] >= 0:
-            return -1
-        v = sliding.part[j, 1]
-        if sliding.node[j] == i + 1 and (w > 0.0) == (v > 0.0) and (w < 0.0) == (v < 0.0):
-            return j
-    return -1
+    return before if part < 0.0 or (part == 0.0 and side < 0) else after
 
 
 @kernel
-def _is_whole(surfaces, sliding, k):
-    """Return whether a contact of a rod is of a station that bears all that its edges do."""
-    s, node = sliding.surface[k], sliding.node[k]
-    return surfaces.whole[s, node] if surfaces.node_between[s, node] else surfaces.kind[s] == PLANE
-
-
-@kernel
-def _on_one_face(surfaces, sliding, k, j):
-    """Return whether two contacts with one surface are of such stations, and on the same flat face."""
-    n = sliding.normal
-    along = n[k, 0] * n[j, 0] + n[k, 1] * n[j, 1] + n[k, 2] * n[j, 2]
-    return _is_whole(surfaces, sliding, j) and along > 1.0 - SAME_FACE
-
-
-@kernel
-def _tangential_slip(sliding, p, at, stage, k, arm, lever, slip_out):
-    """Write the slip of a contact since the origin of the stage in its tangent plane [m]."""
-    _slip(sliding, p.surfaces, p.strands, at, stage, k, arm, lever, slip_out)
-    n = sliding.normal
-    along = slip_out[0] * n[k, 0] + slip_out[1] * n[k, 1] + slip_out[2] * n[k, 2]
+def _change(sliding, surfaces, strands, at, stage, k, e, change_out):
+    """Write by how much slip changes along edge e, in the tangent plane of contact k [m], and return its size."""
+    n, b, start = strands.edge_node[e], surfaces.body[sliding.surface[k]], stage.origin_position
     for c in range(3):
-        slip_out[c] -= along * n[k, c]
+        change_out[c] = (at.position[n + 1, c] - start[n + 1, c]) - (at.position[n, c] - start[n, c])
+        for d in range(3):
+            turned = sliding.rotation[b, c, d] - sliding.origin_rotation[b, c, d]
+            change_out[c] -= turned * (at.position[n + 1, d] - at.position[n, d])
+    _project(sliding, k, change_out)
+    return math.sqrt(change_out[0] ** 2 + change_out[1] ** 2 + change_out[2] ** 2)
 
 
 @kernel
-def _change(u, v, stuck):
-    """Return the difference of the slips of two stations [m], and whether what is between them or close by slips less
-    than `stuck`, or than from place to place; not if it is so small that friction hardly differs.
+def _turns(slip, change, size, reach, stuck):
+    """Return whether what is within a part `reach` of an edge from a contact slips less than `stuck`, or than from
+    place to place.
     """
-    change = along = first = 0.0
+    along = first = 0.0
     for c in range(3):
-        change += (v[c] - u[c]) ** 2
-        along += u[c] * (v[c] - u[c])
-        first += u[c] * u[c]
-    if change <= (ALIKE * stuck) ** 2:
-        return math.sqrt(change), False
-    part = min(max(-along / change, -BESIDE), 1.0 + BESIDE)
-    least = first + part * (2.0 * along + part * change)
-    return math.sqrt(change), least <= max(stuck * stuck, change / PARTS**2)
-
-
-@kernel
-def _share(surfaces, i, e):
-    """Return what of the load of a station acts on edge e beside it."""
-    b, a = surfaces.node_edges[i, 0], surfaces.node_edges[i, 1]
-    return 1.0 if b == a else surfaces.edge_length[e] / (surfaces.edge_length[b] + surfaces.edge_length[a])
+        along += slip[c] * change[c]
+        first += slip[c] * slip[c]
+    part = min(max(-along / (size * size), min(reach, 0.0)), max(reach, 0.0))
+    least = first + part * (2.0 * along + part * size * size)
+    return least <= max(stuck * stuck, (size / PARTS) ** 2)
 
 
 @kernel
 def _spread(sliding, p, at, stage, count):
-    """Spread contacts of stations over edges in which slip has turned round, and return the number of all contacts.
-
-    What an edge takes is its share of the station's whole load, whatever the edge before it took.
-    """
-    surfaces, whole, step = p.surfaces, count, stage.length
+    """Spread contacts of rods by which slip has turned round over their stretches; return the number of contacts."""
+    surfaces, strands, whole, step = p.surfaces, p.strands, count, stage.length
     most = sliding.load.shape[0] - surfaces.near_gap.shape[0]
-    arm, lever, u, v = stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
+    arm, lever, slip, change = stack_vector(3), stack_vector(3), stack_vector(3), stack_vector(3)
+    stuck = sliding.threshold * step
     for b in range(at.rotation.shape[0]):
         product_transposed(at.rotation, b, sliding.back, b, sliding.rotation, b)
     for k in range(whole):
-        sliding.left[k] = sliding.load[k]
-    for k in range(whole):
-        if surfaces.contact_point_body[sliding.first[k]] >= 0 or not _is_whole(surfaces, sliding, k):
+        if sliding.length[k] == 0.0:
             continue
-        j = _next_station(sliding, surfaces, p.strands, k, whole)
-        if j < 0 or count - whole + PARTS > most:
+        i, s, c, load = sliding.node[k], sliding.surface[k], sliding.part[k, 0], sliding.load[k]
+        before, after = surfaces.node_edges[i, 0], surfaces.node_edges[i, 1]
+        both = surfaces.edge_length[before] + surfaces.edge_length[after]
+        half, ends = sliding.length[k] / both, before == after and c == 0.0
+        if ends:
+            half *= 2.0
+        places = int(math.ceil(PARTS * half - ROUNDING))
+        if count - whole + 2 * places > most:
             continue
-        if surfaces.kind[sliding.surface[k]] != PLANE and not _on_one_face(surfaces, sliding, k, j):
+        _slip(sliding, surfaces, strands, at, stage, k, arm, lever, slip)
+        _project(sliding, k, slip)
+        for side in range(-1, 2, 2):
+            e = _edge_beside(surfaces, strands, i, c, side)
+            if e < 0:
+                continue
+            size = _change(sliding, surfaces, strands, at, stage, k, e, change)
+            if size > ALIKE * stuck:
+                sliding.spread[s, i] |= _turns(slip, change, size, side * (half + BESIDE), stuck)
+        if not sliding.spread[s, i]:
             continue
-        _tangential_slip(sliding, p, at, stage, k, arm, lever, u)
-        _tangential_slip(sliding, p, at, stage, j, arm, lever, v)
-        i, s = sliding.node[k], sliding.surface[k]
-        e = surfaces.node_edges[i, 1]
-        change, turns = _change(u, v, sliding.threshold * step)
-        sliding.spread[s, e] |= turns
-        if not sliding.spread[s, e]:
-            continue
-        for part in range(PARTS):
-            near = k if 2 * part < PARTS else j
-            share = _share(surfaces, i if near == k else i + 1, e)
-            _add_place(sliding, surfaces, at, k, j, near, (part + 0.5) / PARTS, arm, count)
-            sliding.load[count] = share * sliding.load[near] * 2.0 / PARTS
-            sliding.smooth[count] = max(sliding.threshold, change / (PARTS * step))
-            sliding.left[near] -= share * sliding.load[near] * 2.0 / PARTS
-            count += 1
-    for k in range(whole):
-        sliding.load[k] = max(sliding.left[k], 0.0)
+        for side in range(-1, 2, 2):
+            e = _edge_beside(surfaces, strands, i, c, side)
+            if e < 0:
+                continue
+            share = 1.0 if ends else surfaces.edge_length[e] / both if c == 0.0 else 0.5
+            size = _change(sliding, surfaces, strands, at, stage, k, e, change)
+            for place in range(places):
+                _add_place(sliding, surfaces, at, k, c + side * half * (place + 0.5) / places, arm, count)
+                sliding.load[count] = load * share / places
+                sliding.smooth[count] = max(sliding.threshold, size * half / (places * step))
+                count += 1
+        sliding.load[k] = 0.0
     return count
 
 
 @kernel
-def _add_place(sliding, surfaces, at, k, j, near, part, arm, count):
-    """Write the contact of a place of the edge between the stations of contacts k and j, of which one is `near`."""
-    i, s, w = sliding.node[k], sliding.surface[k], sliding.part[near, 1]
-    same = count < sliding.count[0] and sliding.first[count] == sliding.first[near] and sliding.surface[count] == s
+def _add_place(sliding, surfaces, at, k, part, arm, count):
+    """Write the contact of a place of the stretch of contact k, at a part of an edge from its node; arm is scratch."""
+    i, s, w = sliding.node[k], sliding.surface[k], sliding.part[k, 1]
+    same = count < sliding.count[0] and sliding.first[count] == sliding.first[k] and sliding.surface[count] == s
     sliding.same[count] = same and sliding.part[count, 0] == part and sliding.part[count, 1] == w
-    sliding.first[count], sliding.surface[count], sliding.node[count] = sliding.first[near], s, i
+    sliding.first[count], sliding.surface[count], sliding.node[count] = sliding.first[k], s, i
     sliding.part[count, 0], sliding.part[count, 1] = part, w
     sliding.last_load[count] = sliding.load[count]
+    mix = min(part, 0.0), max(part, 0.0), 1.0 if part < 0.0 else 0.0, 0.0 if part < 0.0 else 1.0, 0.0, 0.0
+    x, b = _on_curve(surfaces, at, i, mix), surfaces.body[s]
     for c in range(3):
-        arm[c] = sliding.arm[k, c] + part * (sliding.arm[j, c] - sliding.arm[k, c])
+        arm[c] = sliding.arm[k, c]
         sliding.arm[count, c] = arm[c]
-        sliding.lever[count, c] = sliding.lever[k, c] + part * (sliding.lever[j, c] - sliding.lever[k, c])
-        sliding.normal[count, c], sliding.axis[count, c] = sliding.normal[near, c], sliding.axis[near, c]
-        sliding.mu[count, c] = sliding.mu[near, c]
-    write_rate(surfaces, at, i, (0.0, part, 0.0, 1.0, 0.0, 0.0), arm, count, sliding.arm_rate)
+        sliding.lever[count, c] = x[c] + arm[c] - at.pose_position[b, c]
+        sliding.normal[count, c], sliding.axis[count, c] = sliding.normal[k, c], sliding.axis[k, c]
+        sliding.mu[count, c] = sliding.mu[k, c]
+    write_rate(surfaces, at, i, mix, arm, count, sliding.arm_rate)
 
 
 @kernel

@@ -167,7 +167,7 @@ def build_contact(
             node_axis=found.column("node_axis", np.int64),
             surface_grain=surface_grain,
             point_grain=point_grain,
-            spreads=bool((flat.any() and not bent.all()) or divides),
+            spreads=bool(flat.any() or divides),
             **friction_values(scene, scene.friction, surface_owner, surface_grain, point_grain),
         ),
         surface_names=tuple(s.collider.name for s in surfaces),

@@ -48,6 +48,9 @@ RECOVERY = 1.03
 SETTLED, LONGEST = 1.0, 100.0
 """Two rounds at least so long [s], or as long as failures allow, must find the shape at rest, one after the other but
 for failures, which come from rounding where nothing holds the robot; no round is longer than the second."""
+CREEP, STEADY = 1e-5, 0.9
+"""Part of friction's threshold below which a speed that falls no further, by less than the second from round to round,
+is that of creep: friction holds what pushes so weakly, but its smoothed law has no force at rest."""
 MAX_ROUNDS = 300
 WORTH_KEEPING = 1e-6
 """Of the longest rod: displacement of a round without convergence that is no rounding."""
@@ -194,7 +197,7 @@ class _Search:
         stepper.engine.set_drive(state, self.stepper.surroundings.load_factor(self.state, self.ended))
 
     def run(self) -> StaticReport:
-        state, engine = self.state, self.stepper.engine
+        state, engine, model = self.state, self.stepper.engine, self.stepper.model
         begin, start = state.copy(), state.copy()
         length, moved, before, settled, growth, longest = FIRST, math.inf, math.inf, 0, GROWTH, LONGEST
         while self.rounds < MAX_ROUNDS:
@@ -227,12 +230,14 @@ class _Search:
             at_rest = length >= enough and moved <= self.tolerance
             if length < SETTLED:  # rounds come to rest geometrically: what all that follow would move
                 at_rest &= moved * moved <= self.tolerance * (before - moved)
+            if model.sliding.acts and length >= enough:
+                at_rest |= STEADY * before <= moved <= CREEP * model.sliding.threshold * length
             settled = settled + 1 if at_rest else 0
             if settled == 2:
                 return self._report(attempt.residual * length)
             length = max(enough, length) if moved <= self.tolerance else min(growth * length, longest)
         hint = ": forces that follow it have no potential; look from where a run comes to rest"
-        hint = hint if follows(self.stepper.model) else ""
+        hint = hint if follows(model) else ""
         raise self._failure(f"the shape does not come to rest{hint}", moved)
 
     def _find_rest(self, begin: State, length: float) -> bool:

@@ -14,6 +14,7 @@ from support.slips import dissipation
 
 from bilayer_core.forces.surface_friction import PARTS
 from bilayer_core.model.force_list import FORCES
+from bilayer_core.verification.validate.friction import two_boxes
 
 ELASTIC = ("stretching", "bending", "twisting", "bond")
 ROD_CONTACT = ("rod barrier", "rod friction", "flattening")  # see `test_rod_contact.py`, `test_flattening.py`
@@ -125,12 +126,13 @@ def test_friction_along_a_step_is_that_of_the_ways_of_contacts(hub):
     assert abs(found[2] - found[0]) > 1e-3 * found[0]
 
 
+@pytest.mark.parametrize("below", [(GROUND,), two_boxes(0.0137)], ids=["ground", "two boxes"])
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_friction_where_slip_turns_round_within_edges_agrees_with_differences(dimension):
+def test_friction_where_slip_turns_round_within_edges_agrees_with_differences(dimension, below):
     law = contact(coefficient=0.4)
     law["friction"] |= {"forward": 0.3, "backward": 0.5}
     strip = rod([layer()], length=0.03, stations=7, start=(0, 0, 9e-4))
-    content = scene([strip], contact=law, obstacles=[GROUND])
+    content = scene([strip], contact=law, obstacles=list(below))
     problem = Problem(content, np.random.default_rng(3), "laminate", dimension, noise=5e-5)
     assert problem.evaluator.problem.sliding.count[0] >= 7 + 2 * PARTS
     check(problem, ("friction",))

@@ -8,6 +8,7 @@ import pytest
 from bilayer_core import Simulator, load_scene
 from bilayer_core.cli import main
 from bilayer_core.errors import SimulationError
+from bilayer_core.verification.validate.friction import box_on_ground, stride
 
 DISTANCE, STIFFNESS = 0.5e-3, 1e7
 
@@ -129,3 +130,10 @@ def test_a_robot_that_nothing_holds_cannot_settle():
 def test_a_settled_robot_can_start_in_motion():
     simulator = Simulator(load_scene(worm(0.65e-3, start="settle", velocity=[0, 0, 1])))
     assert simulator.velocities[:, 2] == pytest.approx(1.0)
+
+
+def test_a_strip_that_the_border_of_a_box_would_push_aside_settles_where_friction_holds_it():
+    """Friction's law has no force at rest, so it creeps by 1e-11 m/s. The stride is that of a beam on both barriers,
+    solved by finite differences.
+    """
+    assert stride(0.4, 0.5, 41, box_on_ground(0.0447))[0] == pytest.approx(0.5638, rel=0.01)

@@ -273,7 +273,7 @@ def test_a_list_of_near_pairs_holds_what_is_near_and_the_nearest():
     radius, group = np.full(300, 0.01), np.tile([0, 1], 150)
     can_collide = np.array([[True, True], [True, False], [False, True], [True, True]])
     listed = {name: np.zeros(1200, dtype=np.int64) for name in ("near_contact_point", "near_surface", "near_node")}
-    listed |= {name: np.zeros(1200) for name in ("near_gap", "near_radius", "near_weight")}
+    listed |= {name: np.zeros(1200) for name in ("near_gap", "near_radius", "near_weight", "near_length")}
     listed |= {"near_arm": np.zeros(1200, dtype=bool), "near_mix": np.zeros((1200, 6)), "sharpest": np.full(4, -1.0)}
     then = {"listed_contact_point": (300, 3), "listed_surface_position": (4, 3), "listed_surface_rotation": (4, 3, 3)}
     for reach, spread in ((0.05, 1.0), (0.01, 5.0)):

@@ -68,7 +68,7 @@ class Surfaces:
     near_mix: Matrix = ("near", 6)  # of its edges; see `contact.near`
     near_radius: Vector = ("near",)  # [m]
     near_weight: Vector = ("near",)  # Δl of the barrier [m]
-    whole: FlagTable = ("surface", "node")  # whether a station bears all that its edges do, though they may have parts
+    near_length: Vector = ("near",)  # of the stretch of a rod before a flat face that it stands for, 0 elsewhere [m]
     near_count: Indices = (1,)
     margin: Vector  # shape (1,)
     extent: Vector = ("surface",)
@@ -112,18 +112,18 @@ class Sliding:
     world_axis: Vector  # 0 without one, shape (3,)
     surface_grain: Matrix  # forward direction on each in its body's frame, 0 without one, shape (n_surface, 3)
     point_grain: Matrix  # likewise of contact points, shape (n_contact_point, 3)
-    spreads: bool  # whether a surface has a flat face, on which stations spread their loads where slip turns round
+    spreads: bool  # whether a surface has a flat face, on which contacts spread their loads where slip turns round
     mu: Matrix = ("slide", 3)  # coefficients of contacts: forward, backward, sideways
     count: Indices = (1,)
     places: Indices = (1,)  # how many of them are places of edges
-    spread: FlagTable = ("surface", "edge")  # in which slip has turned round in this stage
+    spread: FlagTable = ("surface", "node")  # by which slip has turned round in this stage
     first: Indices = ("slide",)
     node: Indices = ("slide",)  # of contacts of rods
     surface: Indices = ("slide",)
-    part: Matrix = ("slide", 2)  # along the edge after the node, and across: which of the points of a node it is
+    part: Matrix = ("slide", 2)  # of an edge from the node, and across: which of the points of a node it is
     smooth: Vector = ("slide",)  # thresholds of contacts [m/s]
     load: Vector = ("slide",)
-    left: Vector = ("slide",)  # what places of edges leave of them
+    length: Vector = ("slide",)  # of their stretches of rods [m]
     same: Flags = ("slide",)  # whether such a place was there before
     last_load: Vector = ("slide",)  # before contacts were frozen anew
     change: Vector = ("slide",)  # of normal forces then, before relaxation

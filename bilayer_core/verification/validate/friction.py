@@ -245,14 +245,30 @@ SLIDER = {"length": 0.02, "thickness": 4e-3, "coefficient": 0.5}
 """A stiff strip that slides over the ground or along a strip that is held."""
 
 
-def _box(begin: float, end: float) -> dict:
+def _box(begin: float, end: float, name: str = "box") -> dict:
     """Return a box between two places along x [m] whose top is that of the ground."""
     place = [0.5 * (begin + end), 0, -0.01]
-    return {"name": "box", "type": "box", "position": place, "size": [end - begin, 0.05, 0.02]}
+    return {"name": name, "type": "box", "position": place, "size": [end - begin, 0.05, 0.02]}
 
 
-ON_BOXES = {"on a box": (_box(-0.1, 0.2),), "from a box onto the ground": (_box(-0.1, 0.0237), GROUND)}
-"""Obstacles under strips that crawl, but for the ground alone; the box ends between stations, away from what rests."""
+def box_on_ground(end: float) -> tuple[dict, ...]:
+    """Return a box that ends at a place along x [m], and the ground."""
+    return _box(-0.1, end), GROUND
+
+
+def two_boxes(meet: float) -> tuple[dict, ...]:
+    """Return two boxes that meet at a place along x [m]."""
+    return _box(-0.1, meet), _box(meet, 0.2, "next")
+
+
+ON_BOXES = {
+    "on a box": (_box(-0.1, 0.2),),
+    "from a box onto the ground": box_on_ground(0.0237),
+    "from box to box": two_boxes(0.0427),
+}
+"""Obstacles under strips that crawl, but for the ground alone. On the ground the box ends away from what rests, since
+the pressure is uneven near its border; the two boxes meet within an edge of what rests.
+"""
 
 
 def shift_of_pressure(under: str, width: float, dimension: int) -> tuple[float, float]:
