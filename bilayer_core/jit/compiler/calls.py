@@ -8,13 +8,12 @@ from __future__ import annotations
 import ctypes
 import inspect
 from collections.abc import Callable
-from contextlib import suppress
 from functools import cache
 
 from llvmlite import binding, ir
 from numba import errors, types
 from numba.core import cgutils
-from numba.extending import lower_builtin, models, register_model, type_callable, typeof_impl
+from numba.extending import lower_builtin, type_callable, typeof_impl
 from numba.types import Any as AnyType
 from numba.types import VarArg
 
@@ -34,28 +33,9 @@ def declare_calls() -> None:
         _declare(called)
 
 
-class _KernelType(types.Dispatcher):
-    """Type of a kernel, which is compiled once for all numbers that are written where it is called.
-
-    Numba would compile it for each of them: ``leave(at, 3)`` for 3. LLVM knows them without, since kernels become part of
-    what calls them. Those that ask for the size of an array on the stack by an argument need its value.
-    """
-
-    def get_call_type(self, context, args, kws):
-        """Return the types of a call."""
-        plain = tuple(types.unliteral(of) for of in args)
-        if plain != tuple(args):
-            with suppress(errors.TypingError):
-                return super().get_call_type(context, plain, kws)
-        return super().get_call_type(context, args, kws)
-
-
-register_model(_KernelType)(models.OpaqueModel)
-
-
 @typeof_impl.register(Kernel)
 def _type_of_kernel(kernel, context):
-    return _KernelType(kernel.compiled)
+    return types.Dispatcher(kernel.compiled)
 
 
 @cache
