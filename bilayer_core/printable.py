@@ -39,9 +39,9 @@ def printable(text: str) -> str:
 
 def html_table(title: str, rows: Mapping[str, object]) -> str:
     """Return a small table for notebooks: a title, and a row of each name and its value."""
+    left = " style='text-align:left'"
     cells = "".join(
-        f"<tr><th style='text-align:left'>{escape(shortened(name))}</th>"
-        f"<td style='text-align:left'>{escape(shortened(str(value)))}</td></tr>"
+        f"<tr><th{left}>{escape(shortened(name))}</th><td{left}>{escape(shortened(str(value)))}</td></tr>"
         for name, value in rows.items()
     )
-    return f"<table><caption style='text-align:left'><b>{escape(shortened(title))}</b></caption>{cells}</table>"
+    return f"<table><tr><th colspan='2'{left}>{escape(shortened(title))}</th></tr>{cells}</table>"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import gc
 import traceback
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
@@ -91,7 +92,9 @@ def run_program(arguments: Sequence[str] | None, signals: Signals) -> int:
     """Run the command line, by default that of the process; return its exit code."""
     settings = Settings()
     try:
-        return program.main(arguments, prog_name="bilayer", standalone_mode=False, obj=settings) or 0
+        with warnings.catch_warnings():
+            warnings.showwarning = lambda message, *_: say(f"warning: {message}", err=True)
+            return program.main(arguments, prog_name="bilayer", standalone_mode=False, obj=settings) or 0
     except click.ClickException as error:
         error.show()
         return BilayerError.exit_code

@@ -152,13 +152,12 @@ class Simulator:
     def _repr_html_(self) -> str:
         """Return the simulator as a table for notebooks."""
         plan = f"{self.plan.model} in {self.plan.dimension}-D, {self.plan.integrator}"
-        counts = f"{len(self.rods)} rods, {self.model.node_count} nodes, {len(self.bodies)} bodies"
         stimuli = ", ".join(f"{name} {channel.unit.strip('1')}".strip() for name, channel in self.scene.stimuli.items())
         rows = {
             "time": f"{self.time:g} of {self.scene.duration:g} s",
-            "robot": counts,
+            "rods, nodes, bodies": f"{len(self.rods)}, {self.model.node_count}, {len(self.bodies)}",
             "solver": plan,
-            "stimuli": stimuli,
+            "stimuli": stimuli or "none",
         }
         return html_table(f"{self.scene.name}: {self.scene.title}", rows)
 

@@ -228,6 +228,13 @@ def test_the_names_of_older_versions_are_read_with_a_warning(both):
         run["rod/strap/laminate/position"]
 
 
+def test_the_command_warns_of_an_older_name_in_one_line(bent, tmp_path, capsys):
+    asked = ["plot", str(bent / "half.mcap"), "rod/strip/laminate/position.z", "--out", str(tmp_path / "figure.png")]
+    assert main(asked) == 0
+    told = "warning: quantity 'rod/strip/laminate/position' is now 'rod/strip/position', in the rod's middle line\n"
+    assert capsys.readouterr().err == told
+
+
 def test_an_older_log_of_two_layers_lacks_the_rod_of_both():
     model = synthetic_run.description()
     older = replace(model, strands=tuple(replace(strand, first_station=None) for strand in model.strands))

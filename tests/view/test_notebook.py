@@ -60,14 +60,14 @@ def test_names_of_others_do_not_become_tags():
 
 
 def test_runs_and_recorders_draw_their_quantities(ran):
-    _, run, recorder = ran
+    from matplotlib import pyplot
+
+    (_, run, recorder), open_before = ran, pyplot.get_fignums()
     figure = run.plot("com.z", "rod/arm_0/position.x", "energy/*")
     assert [axes.get_ylabel() for axes in figure.axes] == ["position [mm]", "energy [mJ]"]
     drawn = recorder.plot("com.z").axes[0].lines[0]
     np.testing.assert_allclose(drawn.get_xdata(), recorder.times)
-    from matplotlib import pyplot
-
-    assert pyplot.get_fignums() == []  # else the notebook would show it twice
+    assert pyplot.get_fignums() == open_before  # else the notebook would show it twice
     with pytest.raises(InputError, match="quantity 'com2': there is none; near it: com"):
         run.plot("com2")
     with pytest.raises(InputError, match="name at least one quantity"):

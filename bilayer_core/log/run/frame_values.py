@@ -22,6 +22,8 @@ class FrameValues:
 
     def __init__(self, description: Description) -> None:
         self._node_frames = NodeFrames(description)
+        self._frame: Frame | None = None
+        self._joined: dict[str, Array] = {}
 
     def of(self, entry: Entry, frame: Frame, precision: type = float) -> Array:
         """Return a copy of a quantity.
@@ -41,18 +43,25 @@ class FrameValues:
             return np.array(frame.energy[str(entry.index)])
         if entry.attribute == "solver":
             return np.array(float(getattr(frame, str(entry.index))))
-        held = self._held(entry.attribute, frame).astype(precision)
-        return entry.taken(held[None], tuple(entry.index))[0].copy()
+        held = self._held(entry.attribute, frame)
+        return entry.taken(held[None], tuple(entry.index), precision)[0]
 
     def _held(self, attribute: str, frame: Frame) -> Array:
-        if attribute in ("material_frames", "nodes"):
-            self._node_frames.update(frame)
-            quaternions: Array = self._node_frames.quaternions
-            return quaternions if attribute == "material_frames" else joined(self._node_frames.positions, quaternions)
+        if attribute not in ("material_frames", "nodes", "points"):
+            found: Array = getattr(frame, attribute)
+            return found
+        if frame is not self._frame:
+            self._frame, self._joined = frame, {}
+        if attribute not in self._joined:
+            self._joined[attribute] = self._join(attribute, frame)
+        return self._joined[attribute]
+
+    def _join(self, attribute: str, frame: Frame) -> Array:
         if attribute == "points":
             return joined(frame.positions, frame.strain[:, None], frame.curvature[:, None], frame.contact_forces)
-        found: Array = getattr(frame, attribute)
-        return found
+        self._node_frames.update(frame)
+        quaternions: Array = self._node_frames.quaternions
+        return quaternions if attribute == "material_frames" else joined(self._node_frames.positions, quaternions)
 
 
 def joined(*parts: Array) -> Array:

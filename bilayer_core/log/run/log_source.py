@@ -205,7 +205,8 @@ class LogSource:
             queues.setdefault(self._full(entry.topic), _Queue(self._topics[entry.topic])).wanted.append(entry)
         if not queues:
             return
-        rows = max(1, most // sum(queue.topic.size for queue in queues.values()))
+        made = sum(_size_of_derived(queue) for queue in queues.values())
+        rows = max(1, most // (made + sum(queue.topic.size for queue in queues.values())))
         done = waiting = 0
         for name, stamp, data in self._file.messages(set(queues)):
             queue = queues[name]
@@ -354,6 +355,12 @@ def _align(topics: list[_Topic]) -> Array:
 
 def _group(entry: Entry) -> str:
     return SHAPE_TIME if entry.of_shape else TIME
+
+
+def _size_of_derived(queue: _Queue) -> int:
+    """Return what derived quantities of one message take beside it [bytes]."""
+    message = np.ones((1, *queue.topic.shape), queue.topic.dtype)
+    return sum(entry.taken(message, entry.columns).nbytes for entry in queue.wanted if entry.derive is not None)
 
 
 def _taken(queues: Iterable[_Queue], rows: int) -> dict[str, Array]:

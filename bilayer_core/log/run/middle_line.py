@@ -25,9 +25,12 @@ class LayerMiddle:
 
     def positions(self, poses: Array) -> Array:
         """Return its positions [m], shape (..., nodes, 3), from poses x y z and quaternion, shape (..., nodes, 7)."""
-        x, y, z, w = np.moveaxis(poses[..., 3:], -1, 0)
-        normals = np.stack([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)], axis=-1)
-        return poses[..., :3] + self._part.offset[:, None] * normals
+        x, y, z, w = (poses[..., k] for k in range(3, 7))
+        found, twice = poses[..., :3].astype(float), 2.0 * self._part.offset
+        found[..., 0] += self._part.offset - twice * (y * y + z * z)
+        found[..., 1] += twice * (x * y + z * w)
+        found[..., 2] += twice * (x * z - y * w)
+        return found
 
     def strain(self, values: Array) -> Array:
         """Return its strain, shape (..., nodes), from strain and curvature of the nodes, shape (..., nodes, 2)."""

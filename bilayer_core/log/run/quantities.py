@@ -148,7 +148,7 @@ class Entry:
         values = held[self.index] if isinstance(held, dict) else self.taken(held, tuple(self.index))
         return self.filled(run.shape_times if self.of_shape else run.times, values)
 
-    def taken(self, held: Array, index: tuple[Any, ...]) -> Array:
+    def taken(self, held: Array, index: tuple[Any, ...], precision: type | None = None) -> Array:
         """Return the values of the quantity in rows of an array.
 
         Parameters
@@ -157,13 +157,16 @@ class Entry:
             The attribute of a run, or messages of the topic, shape (rows, ...).
         index : tuple
             Into each row: `index` or `columns`.
+        precision : type, optional
+            Of the values, and of those from which they are derived; by default that of `held`.
 
         Returns
         -------
         ndarray
-            Shape (rows, ...), of the type of `held`.
+            Shape (rows, ...).
         """
         values: Array = held[(slice(None), *index)]
+        values = values if precision is None else values.astype(precision)
         return values if self.derive is None else self.derive(values).astype(values.dtype, copy=False)
 
     def filled(self, times: Array, values: Array) -> Quantity:
@@ -243,7 +246,7 @@ def _in_the_middle(of: str, part: Strand, row_of: dict[int, int]) -> Iterator[En
 def _of_both(of: str, strands: list[Strand], row_of: dict[int, int]) -> Iterator[Entry]:
     """Yield the quantities of a rod of two strands."""
     nodes = np.concatenate([np.arange(strand.nodes.start, strand.nodes.stop) for strand in strands])
-    frames, middle = [row for strand in strands for row in _rows(strand, row_of)], RodMiddle(strands)
+    frames, middle = np.concatenate([_rows(strand, row_of) for strand in strands]), RodMiddle(strands)
     for name, unit, columns, kind, derive in (
         ("position", "m", slice(0, 3), _OF_AXIS, middle.mean),
         ("strain", "", 3, _OF_NODE, middle.mean),
@@ -261,9 +264,9 @@ def _derived(
     return Entry(name, unit, topic, columns, topic, columns, *kind, derive)
 
 
-def _rows(strand: Strand, row_of: dict[int, int]) -> list[int]:
+def _rows(strand: Strand, row_of: dict[int, int]) -> Array:
     """Return where the nodes of a strand are in the topic ``nodes``."""
-    return [row_of[node] for node in range(strand.nodes.start, strand.nodes.stop)]
+    return np.array([row_of[node] for node in range(strand.nodes.start, strand.nodes.stop)])
 
 
 def quantities_of(run: Run) -> Iterator[Quantity]:
