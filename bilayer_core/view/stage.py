@@ -28,7 +28,7 @@ from bilayer_core.view.theme import (
     SIDE_SHADE,
     Theme,
 )
-from bilayer_core.view.window import FINER, Part, Window, lay_over, part_around, pixels_of
+from bilayer_core.view.window import FINER, Part, Window, lay_over, outlined, part_around, pixels_of
 
 if TYPE_CHECKING:
     from PIL import Image
@@ -161,7 +161,7 @@ class Stage:
         left, upper, right, lower = part
         if self._theme.transparent and any(hiding):
             picture[upper:lower, left:right] = 0  # the ground is drawn with all else
-        drawn = self._window.draw(shot, part, FINER)
+        drawn = outlined(self._window.draw(shot, part, FINER))
         lay_over(picture, (drawn * PALE).astype(np.uint8) if pale else drawn, part)
 
     def _part(self, shot: Shot, points: np.ndarray) -> Part | None:

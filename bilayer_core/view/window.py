@@ -24,6 +24,7 @@ Part = tuple[int, int, int, int]
 FINER = 2  # times as many pixels along each side are drawn of what has edges
 _LANES = np.uint64(0x00FF00FF00FF00FF)
 ROOM = 2  # pixels round what is seen
+EDGE = 0.6  # brightness of the edge of what is drawn
 
 
 def require_vtk() -> None:
@@ -154,6 +155,24 @@ class Window:
         found = vtkUnsignedCharArray()
         self._window.GetRGBACharPixelData(0, 0, width - 1, height - 1, 0, found)
         return vtk_to_numpy(found).reshape(height, width, 4)[::-1]
+
+
+def outlined(drawn: np.ndarray) -> np.ndarray:
+    """Return what is drawn with a darker edge, so that pale strips are seen on pale ground.
+
+    Parameters
+    ----------
+    drawn : ndarray
+        RGBA, colours times opacity, with `FINER` times as many pixels along each side.
+    """
+    seen = drawn[..., 3] > 0
+    within = seen[: -2 * FINER, FINER:-FINER] & seen[2 * FINER :, FINER:-FINER]
+    within &= seen[FINER:-FINER, : -2 * FINER] & seen[FINER:-FINER, 2 * FINER :]
+    rows, columns = np.nonzero(seen[FINER:-FINER, FINER:-FINER] & ~within)
+    rows, columns = rows + FINER, columns + FINER
+    found = drawn.copy()
+    found[rows, columns, :3] = (EDGE * found[rows, columns, :3]).astype(np.uint8)
+    return found
 
 
 def lay_over(picture: np.ndarray, drawn: np.ndarray, part: Part) -> None:

@@ -244,6 +244,15 @@ def test_the_meaning_of_arrows_and_squares_is_in_pictures_of_every_shape(log, si
     assert apart.sum() > 400 and not apart[0].any() and not apart[:, [0, -1]].any()
 
 
+def test_what_is_drawn_has_a_darker_edge_two_pixels_wide():
+    drawn = np.zeros((40, 60, 4), np.uint8)
+    drawn[10:30, 20:50] = 200, 100, 50, 255
+    edged = window.outlined(drawn)
+    assert (edged[12:28, 22:48] == drawn[12:28, 22:48]).all() and (edged[..., 3] == drawn[..., 3]).all()
+    changed = np.any(edged != drawn, axis=2)
+    assert changed.sum() == 20 * 30 - 16 * 26 and (edged[10:12, 20:50, 0] == 120).all()
+
+
 def test_several_instants_in_one_picture_are_pale_but_for_the_last(log, tmp_path, monkeypatch):
     studio = Studio(log, Look.of(size=SIZE, background="white"))
     studio.picture(tmp_path / "pale.png", 4.0, 1.2)
@@ -272,6 +281,7 @@ def test_a_camera_that_follows_shows_the_way_and_whole_arrows(log):
 def test_drawing_the_part_where_the_robot_is_gives_the_whole_picture(log, look, tmp_path, monkeypatch):
     """The same colours as if all of it had been drawn with twice as many pixels: no seam, nothing cut off."""
     studio, parts = Studio(log, Look.of(size=SIZE, **look)), []
+    monkeypatch.setattr(stage, "outlined", lambda drawn: drawn)  # ground that is drawn with all else has no edge
     around = window.part_around
     monkeypatch.setattr(stage, "part_around", lambda *of: parts.append(around(*of)) or parts[-1])
     studio.picture(tmp_path / "part.png", 3.0)
