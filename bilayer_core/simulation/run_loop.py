@@ -18,11 +18,13 @@ from bilayer_core.jit.piece import loading
 from bilayer_core.model.state import State
 from bilayer_core.observed.inputs import Input
 from bilayer_core.observed.observer import Observed, Observer
+from bilayer_core.simulation.capture import Capture, make_frame
 from bilayer_core.simulation.controls import Controls
 from bilayer_core.simulation.observers import Schedule, first_failure
 from bilayer_core.simulation.plane_watch import PlaneWatch
 from bilayer_core.simulation.run_result import RunResult, Termination
 from bilayer_core.simulation.statistics import RunStatistics, center_of_mass
+from bilayer_core.simulation.step_span import StepSpan
 from bilayer_core.simulation.stepper import Stepper, StepReport
 from bilayer_core.simulation.strip_sections import FOLDS, folds
 
@@ -100,7 +102,7 @@ class RunLoop:
     cpu_time, wall_time : float
         Of the steps [s].
     attached : list of Schedule
-        Of observers that look whoever makes steps.
+        Of observers that look whoever makes steps, and of those of a run while it lasts.
     """
 
     def __init__(
@@ -168,36 +170,44 @@ class RunLoop:
         self.compile()
         begin, before = self._time, self._state.step[0]
         until = until if self._stepper.steps.adaptive else math.inf
-        found = self.integrate(1, until, math.inf)
+        found = self.integrate(1, until)
         while whole and self._state.step[0] == before:
-            found = found.followed_by(self.integrate(1, until, math.inf))
+            found = found.followed_by(self.integrate(1, until))
         counts = found.done, found.rejected, found.iterations, found.factorisations
         return StepReport(self._time, self._time - begin, *counts, found.largest_residual, found.inaccurate)
 
-    def integrate(
-        self, most: int, until: float, due: float, interrupted: Callable[[], bool] | None = None
-    ) -> IntegrationReport:
-        """Advance by at most so many steps or parts of them, to `until` [s] at the latest, and by none after one that
-        has reached `due` [s], or as long as nobody has `interrupted` them.
+    def integrate(self, most: int, until: float, interrupted: Callable[[], bool] | None = None) -> IntegrationReport:
+        """Advance by at most so many steps or parts of them, to `until` [s] at the latest, as long as nobody has
+        `interrupted` them, and show observers what they are due to see.
         """
-        state, before = self._state, float(self._state.step[0])
+        state, before, stepper = self._state, float(self._state.step[0]), self._stepper
         if self._stepper.steps.adaptive:
             self._controls.note_end(until)
         if self._plane_watch is not None:
             most = min(most, self._plane_watch.steps_left)
-        due = min([due, *(attached.next_due() for attached in self.attached)])
+        due = min((attached.next_due() for attached in self.attached), default=math.inf)
         with self.timed():
+            begin = Capture(stepper, state) if stepper.reach(state) >= due else None
             try:
-                found = self._stepper.integrate(state, most, until, due, interrupted)
+                found = stepper.integrate(state, most, until, due, interrupted)
             except SimulationError:
                 self.termination = Termination.FAILED.value
                 raise
-            self.statistics.update(found, int(state.step[0] - before), self._stepper)
+            self.statistics.update(found, int(state.step[0] - before), stepper)
+        self._show_due(begin)
         self._look_out(found.done)
         self._look_at_strips(found.done)
-        for attached in self.attached:
-            attached.observe_due()
         return found
+
+    def _show_due(self, begin: Capture | None) -> None:
+        """Show what is due up to now, after a step that has one due in it and the start of which was captured."""
+        due = [attached for attached in self.attached if attached.is_due()]
+        if not due:
+            return
+        end = Capture(self._stepper, self._state)
+        span = StepSpan(begin or end, end, self._stepper.surroundings)
+        for attached in due:
+            attached.observe_due(lambda time: make_frame(span.at(time), self.statistics, self.cpu_time))
 
     def _look_out(self, steps: int, last: bool = False) -> None:
         """Look out of the plane now and then, after so many more steps; the first look needs more of the program."""
@@ -238,13 +248,17 @@ class RunLoop:
             raise InputError(f"duration: {left:g} s is less than half a step of {steps.dt:g} s; nothing would happen")
         self.compile()
         begin, cpu, wall, before = self._time, self.cpu_time, wall_time(), self._state.step[0]
-        end = begin + count * steps.dt if fixed else self._stepper.end_near(begin + left if until is None else until)
+        end = begin + count * steps.dt if fixed else begin + left if until is None else until
         last = end - 0.5 * steps.dt if fixed else end
         schedule = Schedule(observers, observed)
         ends_of_listening = [self._controls.listen(of.note) for of in observers if hasattr(of, "note")]
         try:
             schedule.start()
-            termination = self._advance(end, last, schedule, inputs, callbacks)
+            self.attached.append(schedule)
+            try:
+                termination = self._advance(end, last, inputs, callbacks)
+            finally:
+                self.attached.remove(schedule)
             if termination is Termination.COMPLETED:
                 self._look_out(0, last=True)
                 self._look_at_strips(0, last=True)
@@ -264,9 +278,7 @@ class RunLoop:
         done = int(self._state.step[0] - before)
         return RunResult(termination, self._time, self._time - begin, done, self.cpu_time - cpu, wall_time() - wall)
 
-    def _advance(
-        self, end: float, last: float, schedule: Schedule, inputs: Sequence[Input], callbacks: Callbacks
-    ) -> Termination:
+    def _advance(self, end: float, last: float, inputs: Sequence[Input], callbacks: Callbacks) -> Termination:
         """Make steps until the end of a run, or until someone ends it.
 
         Parameters
@@ -275,8 +287,6 @@ class RunLoop:
             Where the last adaptive step ends [s].
         last : float
             A step that ends here or later is the last [s].
-        schedule : Schedule
-            Of the observers.
         inputs : sequence of Input
         callbacks : Callbacks
 
@@ -289,10 +299,9 @@ class RunLoop:
             while waiting and waiting[0].time <= self._time:
                 waiting.popleft().apply(self._controls)
             until = min(end, waiting[0].time) if waiting else end
-            found = self.integrate(callbacks.steps_at_once, until, schedule.next_due(), callbacks.interrupted)
+            found = self.integrate(callbacks.steps_at_once, until, callbacks.interrupted)
             if not found.done:
                 return Termination.INTERRUPTED
-            schedule.observe_due()
             if callbacks.each_step is not None:
                 callbacks.each_step(self._time)
             if callbacks.progress is not None:

@@ -89,10 +89,10 @@ def choose_steps(scene: SceneConfig, method: Method, dt: float | None = None, to
             tolerance = DEFAULT_TOLERANCE
             reason = f"neither `dt` nor `tolerance` is given; {WORTH_OF_DEFAULT}"
     length = max(rod.path.length for rod in scene.rods)
-    longest = 1.0 / scene.output.rate if solver.max_step is None else solver.max_step
+    longest = LONGEST_PART * scene.duration if solver.max_step is None else solver.max_step
     newton = solver.newton_tolerance
     if newton is None:
-        newton = NEWTON_PART * (tolerance or DEFAULT_TOLERANCE) * length / longest
+        newton = NEWTON_PART * (tolerance or DEFAULT_TOLERANCE) * length / min(scene.duration, STEP_OF_MOTION)
     dt, halvings = dt or DEFAULT_DT, solver.max_halvings
     first = dt if tolerance is None else min(dt, longest)
     shortest, least_travel = first / 2 ** (DEFAULT_HALVINGS if halvings is None else halvings), math.inf
@@ -111,6 +111,14 @@ def _time_of_sound(scene: SceneConfig) -> float:
     )
 
 
+LONGEST_PART = 0.01
+"""Of the duration of the scene, that an adaptive step may take where nothing else ends it.
+
+The error of a step does not see a growth from almost nothing, such as that of buckling, which methods that damp what is
+fast even suppress in steps that are much too long. The time that somebody gives a scene tells which motions matter.
+"""
+STEP_OF_MOTION = 20.0 * DEFAULT_DT
+"""Length of a step in which something moves [s]; in longer ones almost nothing does."""
 DEFAULT_HALVINGS = 10
 SHORTEST_PART = 1e-3
 """Of two times: in the first sound passes an edge, in the second the fastest point covers what a step may be wrong by.
@@ -123,10 +131,12 @@ their own: what rests on a stiff one has no speed, and what meets it has its err
 NEWTON_PART = 1e-2
 """What Newton's last correction may come to, as a part of the error that a step may have.
 
-A correction at speed u moves a point by at most u h in a step of length h. With u = part × tolerance × L/h_max, L the
-longest rod, that is at most this part of the error allowed in the longest step, and of a smaller one in proportion.
+A correction at speed u moves a point by at most u h in a step of length h. With u = part × tolerance × L/h₀, L the
+longest rod, that is at most this part of the error allowed in a step of length h₀, and of a smaller one in proportion.
+h₀ is `STEP_OF_MOTION`, or the scene's duration if that is shorter; in longer steps a robot rests, and what is left
+decays.
 The correction is taken, so what is left is less by another factor: below `engine.newton.KEEP_FACTOR_BELOW` where
 the matrix is an old one, by the correction itself where it is new. The scales are the scene's own, so u fits
-robots of a micrometre, which move in microseconds, as it fits one of a kilometre; for a rod of 50 mm recorded at 50 Hz
-it is 2.5e-6 m/s. Where this is less than positions can express, the last digit of a position counts (`engine.newton`).
+robots of a micrometre, which move in microseconds, as it fits one of a kilometre; for a rod of 50 mm and a second it
+is 2.5e-6 m/s. Where this is less than positions can express, the last digit of a position counts (`engine.newton`).
 """
