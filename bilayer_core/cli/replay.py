@@ -205,6 +205,8 @@ def _branch_out(path: str, moment: float, options: dict[str, Any]) -> None:
     check_output_path(options["rrd"], options["force"], ".rrd")
     varied, begin = Varied.read(options["vary"]), float(read_state(path, moment)[0][0])
     until = begin + (options["duration"] or _time_left(path, begin))
+    if not options["quiet"]:
+        say_start(begin, moment)
     compile_kernels(options["quiet"])
     common = {"overrides": options["set"], "stimuli": options["stimulus"], "loads": options["load"]}
     branches = []

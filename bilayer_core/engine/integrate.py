@@ -34,6 +34,7 @@ from bilayer_core.engine.step_size import (
     after_success,
     fit,
     reach,
+    tolerance_in,
 )
 from bilayer_core.jit import kernel, piece, record_at
 from bilayer_core.jit.record import CHANGES, Vector, record
@@ -269,7 +270,7 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
     most : int
         A part of a fixed step counts as one.
     newton_tolerance : float
-        [m/s]
+        In steps that are not long [m/s].
     max_iterations : int
 
     Returns
@@ -311,8 +312,9 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
             time = goal if h == goal - begin else begin + h
             h = time - begin
             drive_step(run.actuation, method.nodes, begin, h, control.same, inputs)
+            most_left = tolerance_in(h, newton_tolerance)
             status = make_step(
-                p, state, start_state, method, run.method.history, inputs, work, h, newton_tolerance, max_iterations
+                p, state, start_state, method, run.method.history, inputs, work, h, most_left, max_iterations
             )
             pair, end, iterations = outcome.pair, outcome.configuration, outcome.iterations
             residual, gap = outcome.residual, outcome.gap

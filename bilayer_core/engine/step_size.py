@@ -28,6 +28,9 @@ GROWTH_LIMIT = 1.05
 """By which a step is lengthened to end where it must; the safety above covers it."""
 BEYOND = 1.01 * GROWTH_LIMIT
 """By which a step is lengthened at most, and rounding."""
+LONG_STEP = 0.02
+"""Up to which Newton's tolerance is a speed [s]. In longer steps it is the displacement that this makes in one of this
+length: else what rests would creep for as long as a step may be."""
 NUMBER_ROUNDING = 4.0 * sys.float_info.epsilon
 """Part of a time by which a sum of steps may be off."""
 
@@ -69,6 +72,12 @@ def fit(h, left):
     if left <= GROWTH_LIMIT * h:
         return left
     return 0.5 * left if left < 2.0 * h else h
+
+
+@kernel
+def tolerance_in(h, newton_tolerance):
+    """Return what Newton's last correction may be in a step [m/s], from what it may be in one that is not long."""
+    return newton_tolerance * min(1.0, LONG_STEP / h)
 
 
 @kernel

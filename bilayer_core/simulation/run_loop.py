@@ -30,8 +30,9 @@ from bilayer_core.simulation.strip_sections import FOLDS, folds
 
 STEPS_AT_ONCE = 64
 """That the engine makes before anyone is asked whether to go on."""
-STEPS_TO_LOOK = 128
-"""Between two looks at strips, each of which costs one or two steps."""
+STEPS_TO_LOOK, PART_TO_LOOK = 128, 1.0 / 32.0
+"""Between two looks at strips, each of which costs one or two steps: so many steps at most, and so much of the duration
+of the scene, as steps in which a strip jumps from a long rest are few."""
 NO_FOLD = "a slower stimulus, less of it, or a strip that is less wide does not fold; `section: beam` never does"
 
 
@@ -130,7 +131,7 @@ class RunLoop:
         self._stepper.engine.start_over(height)
         self.termination = Termination.COMPLETED.value
         self.cpu_time = self.wall_time = 0.0
-        self._since_look = 0
+        self._since_look, self._looked = 0, self._time
         if self._plane_watch is not None:
             self._plane_watch.restart(self._time)
 
@@ -186,10 +187,11 @@ class RunLoop:
         if self._plane_watch is not None:
             most = min(most, self._plane_watch.steps_left)
         due = min((attached.next_due() for attached in self.attached), default=math.inf)
+        look = min(self._strips_due, self._plane_watch.due if self._plane_watch is not None else math.inf)
         with self.timed():
             begin = Capture(stepper, state) if stepper.reach(state) >= due else None
             try:
-                found = stepper.integrate(state, most, until, due, interrupted)
+                found = stepper.integrate(state, most, until, min(due, look), interrupted)
             except SimulationError:
                 self.termination = Termination.FAILED.value
                 raise
@@ -211,17 +213,23 @@ class RunLoop:
 
     def _look_out(self, steps: int, last: bool = False) -> None:
         """Look out of the plane now and then, after so many more steps; the first look needs more of the program."""
-        if self._plane_watch is None or not self._plane_watch.is_due(steps, last):
+        if self._plane_watch is None or not self._plane_watch.is_due(steps, self._time, last):
             return
         with self.timed():
             self._plane_watch.look(self._state, self._stepper.surroundings.load_factor(self._state))
 
+    @property
+    def _strips_due(self) -> float:
+        """Time of the next look at strips, unless so many steps come before [s]."""
+        model = self._stepper.model
+        return self._looked + PART_TO_LOOK * model.scene.duration if len(model.flattening.joint) else math.inf
+
     def _look_at_strips(self, steps: int, last: bool = False) -> None:
         """Look for strips that have folded, after so many more steps."""
         self._since_look += steps
-        if not last and self._since_look < STEPS_TO_LOOK:
+        if not last and self._since_look < STEPS_TO_LOOK and self._time < self._strips_due:
             return
-        self._since_look = 0
+        self._since_look, self._looked = 0, self._time
         with self.timed():
             found = folds(self._stepper.model, self._state)
         for name, shape in found.items():

@@ -94,7 +94,9 @@ def test_branches_are_overlaid_in_one_recording(log, tmp_path, capsys):
     out = tmp_path / "branches.rrd"
     command = ["replay", str(log), "--from", "0.1", "--vary", "stimulus.swelling=0:1:12", "--rrd", str(out)]
     assert main(command) == 0
-    assert "12 branches from t = 0.1 s to 0.2 s by stimulus.swelling" in capsys.readouterr().out
+    begin, told = read_state(log, 0.1)[0][0], capsys.readouterr()
+    assert begin < 0.1 and f"12 branches from t = {begin:g} s to 0.2 s by stimulus.swelling" in told.out
+    assert f"begins at t = {begin:.9g} s, where the last logged step before t = 0.1 s ended" in told.err
     with HeadlessViewer() as viewer:
         viewer.open(out)
         found = {item.entity_path for item in viewer.client.get_recording_schema(paths_only=True).entities}

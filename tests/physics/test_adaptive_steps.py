@@ -164,7 +164,7 @@ def test_the_energy_budget_closes_over_adaptive_steps():
 
 
 def test_a_step_in_which_newton_fails_is_shortened_and_the_run_goes_on():
-    kicked = {**cantilever(), "solver": {**PAPER, **EXACT, "dt": 2e-2, "max_newton_iterations": 6}}
+    kicked = {**cantilever(), "solver": {**PAPER, **EXACT, "dt": 2e-2, "max_step": 2e-2, "max_newton_iterations": 6}}
     kicked["loads"][0]["schedule"] = {"type": "hold", "value": 3.0}
     simulator = Simulator(load_scene(kicked), tolerance=0.1, integrator="sdirk2")
     reports = [simulator.step(until=0.1)]
