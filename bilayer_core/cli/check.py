@@ -220,7 +220,9 @@ def _lines(report: dict[str, Any]) -> Iterator[str]:
     for stream in report["outputs"]:
         yield f"  {stream['topic']:36}{stream['type']:40}{stream['rate']:g} Hz"
     log = report["log"]
-    yield from _block("log", [f"{_size(log['bytes_per_second'])} a second, {_size(log['bytes'])} for the whole scene"])
+    yield from _block(
+        "log", [f"at most {_size(log['bytes_per_second'])} a second, {_size(log['bytes'])} for the whole scene"]
+    )
     yield "validity of the model"
     for text in report["within_validity"]:
         yield from _block("within", [text])

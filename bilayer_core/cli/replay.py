@@ -12,7 +12,7 @@ from bilayer_core.cli.json_output import json_option, json_to
 from bilayer_core.cli.nodes import become_replay_node
 from bilayer_core.cli.options import DIFFERS, Duration, Verb, named_numbers, set_option
 from bilayer_core.cli.signals import Interruption
-from bilayer_core.cli.terminal import say
+from bilayer_core.cli.terminal import say, say_start
 from bilayer_core.cli.watch import Interrupt, compile_kernels, count_bar
 from bilayer_core.errors import InputError
 from bilayer_core.simulation.progress_bar import progress_bar
@@ -174,6 +174,8 @@ def _go_on(path: str, moment: float, options: dict[str, Any]) -> None:
 
         observers.append(RrdRecorder(options["rrd"], output.rate, options["force"]))
     duration = options["duration"] or _time_left(path, begin)
+    if not options["quiet"]:
+        say_start(begin, moment)
     compile_kernels(options["quiet"])
     with interrupt, progress_bar(simulator.scene.name, begin, begin + duration, options["quiet"]) as show:
         simulator.run(duration, observers=observers, interrupted=interrupt.grant, progress=show, inputs=inputs)
@@ -204,6 +206,8 @@ def _branch_out(path: str, moment: float, options: dict[str, Any]) -> None:
     check_output_path(options["rrd"], options["force"], ".rrd")
     varied, begin = Varied.read(options["vary"]), float(read_state(path, moment)[0][0])
     until = begin + (options["duration"] or _time_left(path, begin))
+    if not options["quiet"]:
+        say_start(begin, moment)
     compile_kernels(options["quiet"])
     common = {"overrides": options["set"], "stimuli": options["stimulus"], "loads": options["load"]}
     branches = []

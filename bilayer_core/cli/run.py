@@ -15,7 +15,7 @@ from bilayer_core.cli.json_output import STANDARD_OUTPUT
 from bilayer_core.cli.options import Duration, Rate, Verb, named_numbers, scene_argument, set_option
 from bilayer_core.cli.report import summary_lines
 from bilayer_core.cli.signals import Interruption
-from bilayer_core.cli.terminal import say
+from bilayer_core.cli.terminal import say, say_start
 from bilayer_core.cli.watch import Interrupt, compile_kernels
 from bilayer_core.errors import BilayerError, InputError, OutputError, SimulationError, naming
 from bilayer_core.simulation.progress_bar import progress_bar
@@ -36,9 +36,6 @@ INSTEAD = "All the time, in place of its schedule."
 OUTPUT_SUFFIXES = {"log": ".mcap", "rrd": ".rrd", "summary": ".json", "save_state": ".npz"}
 """How the names of outputs end, by their options."""
 
-RATE_ROUNDING = 1e-9
-"""Part of a rate by which two are the same."""
-
 
 @click.command(cls=Verb)
 @scene_argument
@@ -56,7 +53,7 @@ RATE_ROUNDING = 1e-9
     "--log-rate",
     type=Rate(),
     metavar="HZ",
-    help="Frames recorded per simulated second, at most one a step; the run stays the same.",
+    help="Frames recorded per simulated second; the run stays the same.",
 )
 @click.option("--tf", is_flag=True, help="Have frames of bodies and ends of rods on /tf in the log.")
 @click.option("--rrd", metavar="FILE.rrd", help="Write a rerun recording.")
@@ -90,8 +87,8 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
     for name, factor in named_numbers("--load", options["load"]).items():
         simulator.set_load(name, factor)
     duration = _duration(simulator, duration)
-    if not quiet:
-        _say_if_too_often(simulator, options["log_rate"])
+    if not quiet and options["at"] is not None:
+        say_start(simulator.time, options["at"])
     if options["quarter_step"] and not options["error_estimate"]:
         raise InputError("--quarter-step: adds a run to those of --error-estimate; give that too")
     judge = _Judge(simulator, duration, quiet, options["quarter_step"]) if options["error_estimate"] else None
@@ -112,16 +109,6 @@ def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: b
             raise Interruption(interrupt.wished)
         if judge is not None and judge.interruption is not None:
             raise judge.interruption
-
-
-def _say_if_too_often(simulator: Simulator, rate: float | None) -> None:
-    """Say that fewer frames than asked for may be recorded, where steps need not end as often."""
-    adaptive = simulator.tolerance is not None
-    most = simulator.scene.output.rate if adaptive else 1.0 / simulator.dt
-    if rate is not None and rate > most * (1.0 + RATE_ROUNDING):
-        end = f"end at least {most:g} times a second" if adaptive else f"end {most:g} times a second"
-        remedy = f"--set output.rate={rate:g} has them end at these times" if adaptive else "a shorter --dt gives more"
-        say(f"--log-rate {rate:g}: steps {end}, and each gives one frame at most; {remedy}", err=True)
 
 
 def _is_stdout(key: str, options: dict[str, Any]) -> bool:

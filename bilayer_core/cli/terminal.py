@@ -14,6 +14,12 @@ def say(text: object, err: bool = False) -> None:
     click.echo(printable(str(text)), err=err)
 
 
+def say_start(time: float, asked: float) -> None:
+    """Say at which logged step a run begins that was to begin at another time [s], if it is another."""
+    if f"{time:.9g}" != f"{asked:.9g}":
+        say(f"begins at t = {time:.9g} s, where the last logged step before t = {asked:.9g} s ended", err=True)
+
+
 def print_table(titles: Sequence[str], rows: Iterable[Sequence[str]], width: int = 120) -> None:
     """Print a table without a frame: texts in the first column, numbers in the others."""
     from rich.console import Console

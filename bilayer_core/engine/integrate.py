@@ -1,9 +1,10 @@
 """Time integration: fixed or adaptive steps, many in one compiled function.
 
 An adaptive step is made again, shorter, where its error exceeds the tolerance or Newton's method fails. It ends exactly
-at corners and jumps of what acts from outside, and at output times; after a jump steps begin again with the first
-step's length. A fixed step is made in as few equal parts as Newton's method needs, and in two where something jumps
-within it. All that this remembers is in the state.
+at corners and jumps of what acts from outside; after a jump steps begin again with the first step's length. No step
+ends because somebody looks: frames within one are interpolated (`simulation.step_span`). A fixed step is made in as few
+equal parts as Newton's method needs, and in two where something jumps within it. All that this remembers is in the
+state.
 
 A step may pause, for the interpreter to ask whether to go on: before an attempt at it or, where that takes very long,
 within one, which is then made anew. What the attempts before it have shown is in `Attempt`.
@@ -32,7 +33,8 @@ from bilayer_core.engine.step_size import (
     after_rejection,
     after_success,
     fit,
-    next_end,
+    reach,
+    tolerance_in,
 )
 from bilayer_core.jit import kernel, piece, record_at
 from bilayer_core.jit.record import CHANGES, Vector, record
@@ -51,7 +53,7 @@ from bilayer_core.model.records.step import Configuration, Method, RunExtrema, S
 
 configuration_at = record_at(Configuration)
 TIME_ROUNDING = 1e-9
-"""Part of a step, or of an output period, by which two times are the same."""
+"""Part of a step by which two times are the same."""
 CONTACT_SHARE = 2.0
 """Part of the energy of the run by which the energy of contacts may err in a step, over the tolerance: by default an
 impact ends with its speed right to 1 %.
@@ -79,7 +81,6 @@ class StepControl:
     shortest: float  # [s]
     least_travel: float  # of the fastest point in the shortest step, where that is shorter so [m]
     longest: float  # [s]
-    output_rate: float  # adaptive steps end at multiples of its period [1/s]
     same: float  # two times that differ by less are the same [s]
 
 
@@ -179,12 +180,16 @@ def _jump_before(run, end):
 
 @kernel
 def _end_of_adaptive(run, until):
-    """Return the next time at which a step has to end: an output time, a corner, or `until`."""
-    control, begin = run.control, run.clock.time[0]
-    output = next_end(begin + control.same, control.output_rate)
-    end = output if output < until - TIME_ROUNDING / control.output_rate else until
-    corner = corner_after(run.actuation, begin, control.same)
-    return corner if corner < end - control.same else end
+    """Return the next time at which a step has to end: a corner, or `until`."""
+    control = run.control
+    corner = corner_after(run.actuation, run.clock.time[0], control.same)
+    return corner if corner < until - control.same else until
+
+
+@kernel
+def _planned(control, clock):
+    """Return the length that the next step is to have, apart from what it has to end at [s]."""
+    return min(clock.next_step[0], control.longest) if clock.next_step[0] > 0.0 else control.first
 
 
 @kernel
@@ -260,11 +265,12 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
     until : float
         Where the last adaptive step ends exactly, later than now [s]; fixed ones end within half a step of it.
     due : float
-        The first step that ends there or later is the last one, and as long as it would have been [s].
+        The last step is the first that ends there or later, or one after which the next might; each is as long as it
+        would have been [s].
     most : int
         A part of a fixed step counts as one.
     newton_tolerance : float
-        [m/s]
+        In steps that are not long [m/s].
     max_iterations : int
 
     Returns
@@ -287,7 +293,7 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
         if fixed:
             goal = _jump_before(run, grid)
         _begin_again_after_jump(run)
-        planned = min(clock.next_step[0], control.longest) if clock.next_step[0] > 0.0 else control.first
+        planned = _planned(control, clock)
         take_first_stimuli(run.actuation, begin, control.same, inputs)
         method = run.method
         starts = _has_to_start(run, planned)
@@ -306,8 +312,9 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
             time = goal if h == goal - begin else begin + h
             h = time - begin
             drive_step(run.actuation, method.nodes, begin, h, control.same, inputs)
+            most_left = tolerance_in(h, newton_tolerance)
             status = make_step(
-                p, state, start_state, method, run.method.history, inputs, work, h, newton_tolerance, max_iterations
+                p, state, start_state, method, run.method.history, inputs, work, h, most_left, max_iterations
             )
             pair, end, iterations = outcome.pair, outcome.configuration, outcome.iterations
             residual, gap = outcome.residual, outcome.gap
@@ -364,6 +371,6 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
         clock.step[0] += whole
         count_end(p, state, configuration_at(work.configurations[end]), work, gap, time, run.extrema)
         last = time == until or fixed and whole and time > until - 0.5 * control.dt
-        if last or time >= due:
+        if last or time + reach(_planned(control, clock)) >= due:
             return _leave(run, k + 1, CONVERGED, -1, end, gap)
     return _leave(run, most, status, pair, end, gap)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bilayer_core.engine.between_ends import write_between
 from bilayer_core.engine.integrate import integrate
 from bilayer_core.engine.light_over_step import begin_light, end_light
 from bilayer_core.engine.linear.bordered_system import (
@@ -62,7 +63,13 @@ def needed_pieces(model: Model) -> frozenset[str]:
         [of for of_kind, of in ELASTICITY.items() if of_kind != (model.plane.exists, model.flattening.exists)],
     )
     left_out = {of.name for pieces in unused for of in pieces}
-    waiting = [integrate, treat_state, write_rest_strains, *([write_sections] if model.flattening.exists else [])]
+    waiting = [
+        integrate,
+        treat_state,
+        write_rest_strains,
+        write_between,
+        *([write_sections] if model.flattening.exists else []),
+    ]
     for term in TERMS:
         if set(term.names) & set(model.forces):
             pieces = (term.add, term.start, term.update_lagged, term.settle, term.end)

@@ -12,10 +12,9 @@ many iterations, or where the step had to be shortened first.
 
 from __future__ import annotations
 
-import math
 import sys
 
-from bilayer_core.jit.kernel import exact_kernel, kernel
+from bilayer_core.jit.kernel import kernel
 
 SAFETY = 0.9
 PROPORTIONAL, INTEGRAL = 0.6, 0.2
@@ -27,11 +26,13 @@ MANY_ITERATIONS = 15
 """Newton iterations of a stage that are no reason to lengthen steps; with twice as many they are halved."""
 GROWTH_LIMIT = 1.05
 """By which a step is lengthened to end where it must; the safety above covers it."""
-
-PERIOD_ROUNDING = 1e-9
-"""Part of a period by which a time may be off and still ends it."""
+BEYOND = 1.01 * GROWTH_LIMIT
+"""By which a step is lengthened at most, and rounding."""
+LONG_STEP = 0.02
+"""Up to which Newton's tolerance is a speed [s]. In longer steps it is the displacement that this makes in one of this
+length: else what rests would creep for as long as a step may be."""
 NUMBER_ROUNDING = 4.0 * sys.float_info.epsilon
-"""By which part of itself a product of time and rate may be off; more than the above after ten million periods."""
+"""Part of a time by which a sum of steps may be off."""
 
 
 @kernel
@@ -73,14 +74,13 @@ def fit(h, left):
     return 0.5 * left if left < 2.0 * h else h
 
 
-@exact_kernel
-def completed(time, rate):
-    """Return the periods of `rate` [1/s] from time 0 to `time` [s]; one that ends now is complete."""
-    periods = time * rate
-    return math.floor(periods + PERIOD_ROUNDING + NUMBER_ROUNDING * abs(periods))
+@kernel
+def tolerance_in(h, newton_tolerance):
+    """Return what Newton's last correction may be in a step [m/s], from what it may be in one that is not long."""
+    return newton_tolerance * min(1.0, LONG_STEP / h)
 
 
-@exact_kernel
-def next_end(time, rate):
-    """Return the end [s] of the period that has not ended at `time` [s]."""
-    return (completed(time, rate) + 1) / rate
+@kernel
+def reach(planned):
+    """Return a length that no step exceeds which is planned to be so long [s]."""
+    return BEYOND * planned

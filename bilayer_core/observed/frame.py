@@ -202,9 +202,9 @@ class Frame:
     Attributes
     ----------
     time : float
-        Simulated time [s].
+        Simulated time [s]. Within a step all but `state` is interpolated, see `simulation.step_span`.
     step : int
-        Number of steps done.
+        Number of steps done at `time`.
     positions, velocities : ndarray
         Of every node [m, m/s], shape (node_count, 3).
     directors : ndarray
@@ -228,7 +228,7 @@ class Frame:
     com : ndarray
         Mass centre of the robot: rods and clamped bodies, free bodies left out [m], shape (3,).
     stimulus : ndarray
-        Value of each channel that acted over the step that ended here, in its unit, shape (channels,).
+        Value of each channel, where a step ended that which acted over it, in its unit, shape (channels,).
     energy : dict
         Energy of each term [J].
     min_gap : float
@@ -242,7 +242,8 @@ class Frame:
     cpu_time : float
         CPU seconds of the stepping thread up to here [s].
     state : ndarray
-        Flat state for a restart; parts and shapes as in `Description.state_layout`.
+        Flat state for a restart, of the last step that ended at `time` or before; parts and shapes as in
+        `Description.state_layout`.
     contacts : tuple of (str, str)
         Names of what touches: a rod, a body or an obstacle, and another; see `simulation.contact_pairs`.
     rejected : tuple of int

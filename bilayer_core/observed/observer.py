@@ -28,8 +28,8 @@ class Observed(Protocol):
 
 
 class Observer(Protocol):
-    """Something that looks at a run `rate` times in each simulated second: when the first step ends after each multiple
-    of its period, or exactly there. No step is another for it.
+    """Something that looks at a run `rate` times in each simulated second, at the multiples of its period. No step is
+    another for it. One that has `due` as well looks at that time next instead [s], a whole number of nanoseconds.
 
     One that has a method ``note(input)`` is also told what acts from outside (`observed.inputs.Input`).
     """

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterable, Iterator
 
 from bilayer_core.log.file.log_chunks import LogFile
-from bilayer_core.log.messages.cdr import nanoseconds, seconds_text
+from bilayer_core.log.messages.cdr import NANOSECONDS, nanoseconds, seconds_text
 from bilayer_core.log.messages.clouds import CloudEncoder
 from bilayer_core.log.messages.encoders import FrameEncoder, decode_input, encode_float64
 from bilayer_core.log.messages.markers import deleting_all_first
@@ -22,14 +23,16 @@ NOT_COMPARED = ("state", "solver")
 where a process began.
 """
 
+NO_FRAME = "is there, but the run made again has no frame of that time"
+
 
 class DerivedComparison:
-    """Compares stored messages byte by byte with those that are encoded from the frames of the run made again.
+    """Observer that compares stored messages byte by byte with those of the run made again, at their times.
 
     Every frame has all topics of `Rate.OUTPUT` that the log has. Topics of `Rate.DISPLAY` are in the log at a rate of
     their own: the messages that are there are compared. A message on the topic of a stimulus channel repeats an input.
-    The first frame is only compared if it is of the start of a scene: a state that was taken from the log is evaluated
-    anew, which may change the last bits of forces and energies that a step has left.
+    The frames up to the end of the first step are only compared at the start of a scene: a state that was taken from
+    the log is evaluated anew, which may change the last bits of forces and energies that a step has left.
 
     Parameters
     ----------
@@ -46,6 +49,8 @@ class DerivedComparison:
         The first difference, as a sentence; empty if there is none.
     """
 
+    rate = math.inf
+
     def __init__(self, description: Description, file: LogFile):
         transforms = next(file.messages({TF.full_name()}), None)
         prefix = read_prefix(description, transforms[2]) if transforms else ""
@@ -60,32 +65,55 @@ class DerivedComparison:
         channels = {spec.full_name() for spec in stimulus_topics(description)} & file.topics.keys()
         self.topics = channels | self._specs.keys()
         self.count, self.first = 0, ""
-        self._begun, self._incomplete = False, ""
+        self._loaded: int | None = None
+        self._stamp = -1
+        self._incomplete = ""
         self._frames = _by_frame(file.messages(set(self._specs)))
+        self._next = next(self._frames, [])
         self._compare_stimuli(file.messages({INPUTS.full_name(), *channels}))
 
-    def add_frame(self, frame: Frame) -> None:
-        """Take the frame of the next state in the log, made again."""
+    @property
+    def due(self) -> float:
+        """Time of the next frame in the log [s]; infinity after the last, before a reset, and from the first difference
+        on.
+        """
+        comes = self._next and self._next[0][1] > self._stamp and not self.first
+        return self._next[0][1] / NANOSECONDS if comes else math.inf
+
+    def start(self, description: Description) -> None:
+        """Do nothing: the frames come by themselves."""
+
+    def close(self, complete: bool, termination: str = "") -> None:
+        """Do nothing; see `finish`."""
+
+    def observe(self, frame: Frame) -> None:
+        """Compare the messages of a frame, unless it is none of the log's."""
         self.first = self.first or self._incomplete
-        if self.first:
+        stored, stamp = self._next, nanoseconds(frame.time)
+        if self._loaded is None:
+            self._loaded = frame.step
+        if self.first or not stored or stamp < stored[0][1]:
             return
-        stored, stamp = next(self._frames, []), nanoseconds(frame.time)
-        loaded, self._begun = not self._begun and frame.step > 0, True
+        self._next, self._stamp = next(self._frames, []), stamp
+        loaded = 0 < self._loaded == frame.step
         display = any(self._specs[topic].rate is Rate.DISPLAY for topic, *_ in stored)
         clouds = dict(self._clouds.encode(frame)) if display else {}
         for topic, time, data in stored:
             if time != stamp:
-                self._differs(topic, time, "is there, but no state of that time")
+                self._differs(topic, time, NO_FRAME)
             elif not loaded:
                 self._compare_encoded(topic, time, data, frame, clouds)
         for topic in sorted(self._in_every_frame - {topic for topic, *_ in stored}):
             self._incomplete = self._incomplete or _at(topic, stamp, "is missing")
 
     def finish(self, whole: bool) -> None:
-        """Notice what is missing or too many at the end; of a log that is not whole, the last frame may be a part."""
-        self.first = self.first or (self._incomplete if whole else "")
-        for topic, time, _ in next(self._frames, []):
-            self._differs(topic, time, "is there, but no state of that time")
+        """Notice what is missing or too many at the end; a log that is not whole has frames after its last state, and
+        the last may be a part.
+        """
+        if whole:
+            self.first = self.first or self._incomplete
+            for topic, time, _ in self._next:
+                self._differs(topic, time, NO_FRAME)
 
     def _compare_stimuli(self, messages: Iterable[Message]) -> None:
         expected: deque[Message] = deque()

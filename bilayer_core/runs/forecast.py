@@ -28,7 +28,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class LogSize:
-    """Expected size of a log.
+    """Expected size of a log with a state in every frame, the most there can be.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class LogSize:
 def forecast(simulator: Simulator) -> LogSize:
     """Return the expected size of a log of the scene, as `McapRecorder` writes it.
 
-    Contact forces and events are left out: nobody knows how many there will be.
+    Contact forces and events are left out: nobody knows how many there will be. Frames within one step share a state.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Runs made again from their logs: the same one, to compare it bit for bit, or another one from an instant on.
 
-A log holds the scene, what the steps were to be, the state at every frame, and all that acted from outside with the
-step from which on it acted (`observed.inputs`). That is all that a run depends on.
+A log holds the scene, what the steps were to be, the state of the last step before every frame, and all that acted from
+outside with the step from which on it acted (`observed.inputs`). That is all that a run depends on.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from bilayer_core.log.messages.encoders import decode_input
 from bilayer_core.log.messages.topics import INPUTS
 from bilayer_core.log.run.log_reader import read_head, read_messages, read_state
 from bilayer_core.model.set_friction import COEFFICIENTS
-from bilayer_core.observed.frame import Description
+from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.observed.inputs import FRICTION, LOAD, RESET, STIMULUS, UNTIL, Input
 from bilayer_core.observed.system import machine, versions
 from bilayer_core.printable import shortened
@@ -42,6 +42,8 @@ FAR = 1e9
 """Later than any state [s]."""
 TIME_ROUNDING = 1e-9
 """Part of a time that may be rounding."""
+MOMENT = 1e-9
+"""Times that differ by less are the same in logs [s]."""
 
 
 @dataclass(frozen=True)
@@ -164,6 +166,7 @@ def _verified(path: Path, tolerance: float | None, derived: bool) -> Verificatio
     simulator = simulator_of(path)
     longest = max(rod.path.length for rod in simulator.scene.rods)
     comparison = _Comparison(simulator.description, None if tolerance is None else tolerance * longest)
+    look = _Look(simulator.description)
     file, head = LogFile(path), read_head(path)
     messages = DerivedComparison(head.description, file) if derived else None
     compared = {STATE, INPUTS.full_name(), *(messages.topics if messages else ())}
@@ -180,19 +183,20 @@ def _verified(path: Path, tolerance: float | None, derived: bool) -> Verificatio
         time = float(event[0])
         if result.states == 0:
             simulator.load_state(event)  # with all that was set before the log began
+            for observer in (look, *([messages] if messages else ())):
+                simulator.attach(observer)
         else:
-            loose = tolerance is not None or result.first is not None
+            if tolerance is not None or result.first is not None:
+                look.due = time
             try:
-                until = _advance(simulator, time, until, waiting, loose)
+                until = _advance(simulator, time, until, waiting, look.due == time)
             except SimulationError as failure:
                 result.stopped = failure.reason
                 break
         until = _apply(simulator, waiting, until)
         result.states += 1
         result.last_time = time
-        comparison.add(event, simulator.save_state(), result)
-        if messages and result.first is None:
-            messages.add_frame(simulator.frame())
+        comparison.add(event, look.taken_into(simulator.save_state(), time), result)
     if messages:
         if result.equal:
             messages.finish(result.wholeness.whole)
@@ -337,10 +341,13 @@ def _events(path: Path) -> Iterator[Array | Input]:
 
 
 def _advance(simulator: Simulator, time: float, until: float, waiting: list[Input], loose: bool) -> float:
-    """Make steps up to a time, each with what acts from it on; returns until when adaptive steps may go."""
+    """Make steps up to a time, each with what acts from it on; returns until when adaptive steps may go.
+
+    Steps of another machine are not those of the log: when they are `loose`, they end where something acts.
+    """
     while simulator.time < time * (1.0 - TIME_ROUNDING if loose else 1.0):
         until = _apply(simulator, waiting, until)
-        simulator.advance(min(until, time) if loose else until)
+        simulator.advance(min(until, waiting[0].time) if loose and waiting else until)
     return until
 
 
@@ -352,6 +359,37 @@ def _apply(simulator: Simulator, waiting: list[Input], until: float) -> float:
             until = told.values[0]
         told.apply(simulator)
     return until
+
+
+class _Look:
+    """Observer that keeps the places of nodes and bodies at one time: steps of another machine do not end there."""
+
+    rate = math.inf
+
+    def __init__(self, description: Description):
+        self.due = math.inf
+        self._frame: Frame | None = None
+        ends = np.cumsum([0, *(math.prod(shape) for _, shape in description.state_layout)]).tolist()
+        self._parts = {name: slice(*ends[k : k + 2]) for k, (name, _) in enumerate(description.state_layout)}
+
+    def start(self, description: Description) -> None:
+        pass
+
+    def observe(self, frame: Frame) -> None:
+        if abs(frame.time - self.due) < MOMENT:
+            self.due, self._frame = math.inf, frame
+
+    def close(self, complete: bool, termination: str = "") -> None:
+        pass
+
+    def taken_into(self, state: Array, time: float) -> Array:
+        """Return a flat state with the places that were seen at a time, if they were."""
+        if self._frame is not None and abs(self._frame.time - time) < MOMENT:
+            for name, of in (("position", self._frame.positions), ("body_position", self._frame.body_positions)):
+                part = self._parts[name]
+                state[part] = of.ravel()[: part.stop - part.start]
+        self.due, self._frame = math.inf, None
+        return state
 
 
 def _changed(head: Head) -> dict[str, tuple[str, str]]:

@@ -199,10 +199,12 @@ class Solver(Part):
     """Largest error per adaptive step: displacement over the length of the longest rod; 1e-4 unless `dt` is given. It
     bounds no error of a whole run, in which those of steps add up; `bilayer run --error-estimate` tells that."""
     max_step: PositiveTime | None = None
-    """Longest adaptive step; by default a period of `output.rate`."""
+    """Longest adaptive step; by default the longer of 1/250 of `duration`, and of 1/100 of it up to
+    20 ms."""
     newton_tolerance: PositiveSpeed | None = None
-    """Newton's last correction of velocities is at most this; by default the speed that makes 1/100 of `tolerance`
-    (1e-4 with fixed steps) in the longest adaptive step (`max_step`)."""
+    """Newton's last correction of velocities is at most this, and in proportion less in steps of more than 20 ms; by
+    default the speed that makes 1/100 of `tolerance` (1e-4 with fixed steps) in a step of 20 ms, or as long as
+    `duration` if that is shorter."""
     max_newton_iterations: Annotated[int, *whole(1, 10_000)] = 50
     """After which a step counts as failed and is shortened."""
     max_halvings: Annotated[int, *whole(0, 1000)] | None = None
@@ -215,7 +217,8 @@ class Output(Part):
     """How often a run is recorded, in simulated time."""
 
     rate: PositiveRate = 50.0
-    """Of poses, forces, energies and the state. Adaptive steps end at these times, whoever records and how often."""
+    """Of poses, forces, energies and the state. Steps do not end at these times: what is recorded within one is
+    interpolated, and the state is that of the step before."""
     marker_rate: PositiveRate = 20.0
     """Of the large messages, nodes, points and markers; not above `rate`."""
 

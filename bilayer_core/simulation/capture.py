@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from bilayer_core.engine.between_ends import Instant, write_between
 from bilayer_core.forces.flattening import write_sections
 from bilayer_core.model.state import State, sealed
 from bilayer_core.observed.frame import Frame
@@ -19,25 +21,43 @@ from bilayer_core.simulation.strip_sections import across_at_nodes
 
 
 class Capture:
-    """Source of the attributes of a frame: a copy of the state, and of the observations of it."""
+    """Source of the attributes of a frame: a copy of the present state, and of the observations of it."""
 
     def __init__(self, stepper: Stepper, state: State):
         self.model, self.owners = stepper.model, stepper.contact_owners
+        self.time, self.step = float(state.time[0]), int(state.step[0])
+        self.stimulus, self.min_gap = stepper.stimulus.copy(), float(stepper.engine.gap)
         self.seen, self.touching = stepper.observe(state)
-        if self.model.flattening.exists:
-            _ = write_sections.address  # loaded by the thread of the steps, whoever asks for sections
+        for piece in (write_between, *([write_sections] if self.model.flattening.exists else [])):
+            _ = piece.address  # loaded by the thread of the steps, whoever asks
         self.values, self.places = state.values.copy(), state.places
         self.values.flags.writeable = False  # parts of it are handed out as they are
         self.state = Parts(self.values, self.places)
 
+    @cached_property
+    def instant(self) -> Instant:
+        """An end of frames within a step."""
+        return instant_of(self.state, self.seen)
 
-_DERIVED: dict[str, Callable[[Capture], Any]] = {
+    @cached_property
+    def across(self) -> np.ndarray:
+        """Mean curvature across of strips at all nodes [1/m]."""
+        return across_at_nodes(self.model, self.state)
+
+
+def instant_of(state: Parts, seen: Parts) -> Instant:
+    """Return what a state and observations of it have of an instant, as views."""
+    forces = {name: getattr(seen, name) for name in ("contact_force", "contact_wrench", "quaternion")}
+    return Instant(**{name: getattr(state, name) for name in Instant.names if name not in forces}, **forces)
+
+
+_DERIVED: dict[str, Callable[[Any], Any]] = {
     "positions": lambda of: positions_with_points(of.model, of.state),
     "velocities": lambda of: velocities_with_points(of.model, of.state),
     "directors": lambda of: of.state.director1,
     "strain": lambda of: of.seen.strain,
     "curvature": lambda of: of.seen.curvature,
-    "section_curvature": lambda of: np.append(across_at_nodes(of.model, of.state), np.zeros(of.model.point_count)),
+    "section_curvature": lambda of: np.append(of.across, np.zeros(of.model.point_count)),
     "contact_forces": lambda of: of.seen.contact_force,
     "body_positions": lambda of: of.state.body_position,
     "body_quaternions": lambda of: of.seen.quaternion,
@@ -57,7 +77,7 @@ class CapturedFrame(Frame):
     """A `Frame` whose derived attributes are computed when first asked for, in whatever thread that is."""
 
     @classmethod
-    def of(cls, capture: Capture, **known: Any) -> CapturedFrame:
+    def of(cls, capture: Any, **known: Any) -> CapturedFrame:
         """Return a frame with those attributes that need not be computed."""
         frame = object.__new__(cls)
         frame.__dict__.update(known, _capture=capture)
@@ -75,15 +95,14 @@ class CapturedFrame(Frame):
         return Frame, tuple(getattr(self, part.name) for part in fields(Frame))
 
 
-def make_frame(stepper: Stepper, state: State, time: float, statistics: RunStatistics, cpu_time: float) -> Frame:
-    """Return the snapshot of the last accepted configuration."""
-    capture = Capture(stepper, state)
+def make_frame(capture: Any, statistics: RunStatistics, cpu_time: float) -> Frame:
+    """Return the frame of a `Capture`, or of something like it."""
     return CapturedFrame.of(
         capture,
-        time=time,
-        step=int(state.step[0]),
-        stimulus=stepper.stimulus.copy(),
-        min_gap=float(stepper.engine.gap),
+        time=capture.time,
+        step=capture.step,
+        stimulus=capture.stimulus,
+        min_gap=capture.min_gap,
         iterations=statistics.iterations,
         residual=statistics.last_residual,
         substeps=statistics.substeps,

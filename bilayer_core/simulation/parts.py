@@ -10,15 +10,21 @@ Places = dict[str, tuple[int, int, tuple[int, ...]]]
 
 
 class Parts:
-    """Parts of a flat array, as views of it, each made when it is asked for."""
+    """Parts of a flat array, as views of it, each made when it is asked for.
+
+    Attributes
+    ----------
+    flat : ndarray
+    places : Places
+    """
 
     def __init__(self, flat: Array, places: Places):
-        self._flat, self._places = flat, places
+        self.flat, self.places = flat, places
 
     def __getattr__(self, name: str) -> Array:
         try:
-            begin, end, shape = self.__dict__["_places"][name]
+            begin, end, shape = self.__dict__["places"][name]
         except KeyError:
             raise AttributeError(name) from None
-        part = self.__dict__[name] = self._flat[begin:end].reshape(shape)
+        part = self.__dict__[name] = self.flat[begin:end].reshape(shape)
         return part

@@ -38,6 +38,9 @@ GROWTH = math.log(100.0)
 FIRST_LOOK, MOST_STEPS = 8, 256
 """Steps to the first look, and the most between two; until then each comes after twice as many. A look costs two steps
 or three."""
+LONGEST_PART = 0.125
+"""Of the duration of the scene, after which the next look comes however few steps have been made: where almost nothing
+moves they are long."""
 CLEAR_OF_TURNING = 2.0
 """Times the rate at which a free robot's turning seems to grow: modes of a larger rate are others."""
 QUARTER = np.array([[0.0, 1.0], [-1.0, 0.0]])
@@ -63,13 +66,13 @@ class PlaneWatch:
     """
 
     def __init__(self, make: Callable[[int], Stepper], duration: float):
-        self._make, self._slowest = make, GROWTH / duration
+        self._make, self._duration = make, duration
         self._space: Stepper | None = None
         self.restart(0.0)
 
     def take_scene(self, duration: float, take: Callable[[Stepper], None]) -> None:
         """Take another scene of the same model, which `take` gives to a stepper."""
-        self._slowest = GROWTH / duration
+        self._duration = duration
         if self._space is not None:
             take(self._space)
             take(self._plane)
@@ -92,11 +95,17 @@ class PlaneWatch:
         """To the next look, at least 1."""
         return max(1, self._next - self._since_look)
 
-    def is_due(self, steps: int, last: bool = False) -> bool:
-        """Count more steps, of which the `last` of a run may be one, and return whether to look now."""
+    @property
+    def due(self) -> float:
+        """Time of the next look, unless so many steps come before [s]; the first one only comes after steps."""
+        waits = self._done >= FIRST_LOOK and self.since is None
+        return self._time + LONGEST_PART * self._duration if waits else math.inf
+
+    def is_due(self, steps: int, time: float, last: bool = False) -> bool:
+        """Count more steps, up to a time [s], of which the `last` of a run may be one; return whether to look now."""
         self._done += steps
         self._since_look += steps
-        enough = self._since_look >= (FIRST_LOOK if last else self._next)
+        enough = self._since_look >= (FIRST_LOOK if last else self._next) or time >= self.due
         return enough and self.since is None
 
     def look(self, state: State, load_factor: Array) -> None:
@@ -125,9 +134,10 @@ class PlaneWatch:
         """Return a lower bound, to a factor of two, of the largest rate of modes that leave the plane [1/s]; 0 if none
         is fast enough.
         """
-        if self._leaving(state, self._slowest) == 0:
+        slowest = GROWTH / self._duration
+        if self._leaving(state, slowest) == 0:
             return 0.0
-        rate, found = max(self._slowest, CLEAR_OF_TURNING * turning_rate(self._plane, state)), 0.0
+        rate, found = max(slowest, CLEAR_OF_TURNING * turning_rate(self._plane, state)), 0.0
         while rate < FASTEST and self._leaving(state, rate) > 0:
             found, rate = rate, 2.0 * rate
         return found

@@ -18,18 +18,21 @@ from bilayer_core.jit.piece import loading
 from bilayer_core.model.state import State
 from bilayer_core.observed.inputs import Input
 from bilayer_core.observed.observer import Observed, Observer
+from bilayer_core.simulation.capture import Capture, make_frame
 from bilayer_core.simulation.controls import Controls
 from bilayer_core.simulation.observers import Schedule, first_failure
 from bilayer_core.simulation.plane_watch import PlaneWatch
 from bilayer_core.simulation.run_result import RunResult, Termination
 from bilayer_core.simulation.statistics import RunStatistics, center_of_mass
+from bilayer_core.simulation.step_span import StepSpan
 from bilayer_core.simulation.stepper import Stepper, StepReport
 from bilayer_core.simulation.strip_sections import FOLDS, folds
 
 STEPS_AT_ONCE = 64
 """That the engine makes before anyone is asked whether to go on."""
-STEPS_TO_LOOK = 128
-"""Between two looks at strips, each of which costs one or two steps."""
+STEPS_TO_LOOK, PART_TO_LOOK = 128, 1.0 / 32.0
+"""Between two looks at strips, each of which costs one or two steps: so many steps at most, and so much of the duration
+of the scene, as steps in which a strip jumps from a long rest are few."""
 NO_FOLD = "a slower stimulus, less of it, or a strip that is less wide does not fold; `section: beam` never does"
 
 
@@ -100,7 +103,7 @@ class RunLoop:
     cpu_time, wall_time : float
         Of the steps [s].
     attached : list of Schedule
-        Of observers that look whoever makes steps.
+        Of observers that look whoever makes steps, and of those of a run while it lasts.
     """
 
     def __init__(
@@ -128,7 +131,7 @@ class RunLoop:
         self._stepper.engine.start_over(height)
         self.termination = Termination.COMPLETED.value
         self.cpu_time = self.wall_time = 0.0
-        self._since_look = 0
+        self._since_look, self._looked = 0, self._time
         if self._plane_watch is not None:
             self._plane_watch.restart(self._time)
 
@@ -168,50 +171,65 @@ class RunLoop:
         self.compile()
         begin, before = self._time, self._state.step[0]
         until = until if self._stepper.steps.adaptive else math.inf
-        found = self.integrate(1, until, math.inf)
+        found = self.integrate(1, until)
         while whole and self._state.step[0] == before:
-            found = found.followed_by(self.integrate(1, until, math.inf))
+            found = found.followed_by(self.integrate(1, until))
         counts = found.done, found.rejected, found.iterations, found.factorisations
         return StepReport(self._time, self._time - begin, *counts, found.largest_residual, found.inaccurate)
 
-    def integrate(
-        self, most: int, until: float, due: float, interrupted: Callable[[], bool] | None = None
-    ) -> IntegrationReport:
-        """Advance by at most so many steps or parts of them, to `until` [s] at the latest, and by none after one that
-        has reached `due` [s], or as long as nobody has `interrupted` them.
+    def integrate(self, most: int, until: float, interrupted: Callable[[], bool] | None = None) -> IntegrationReport:
+        """Advance by at most so many steps or parts of them, to `until` [s] at the latest, as long as nobody has
+        `interrupted` them, and show observers what they are due to see.
         """
-        state, before = self._state, float(self._state.step[0])
+        state, before, stepper = self._state, float(self._state.step[0]), self._stepper
         if self._stepper.steps.adaptive:
             self._controls.note_end(until)
         if self._plane_watch is not None:
             most = min(most, self._plane_watch.steps_left)
-        due = min([due, *(attached.next_due() for attached in self.attached)])
+        due = min((attached.next_due() for attached in self.attached), default=math.inf)
+        look = min(self._strips_due, self._plane_watch.due if self._plane_watch is not None else math.inf)
         with self.timed():
+            begin = Capture(stepper, state) if stepper.reach(state) >= due else None
             try:
-                found = self._stepper.integrate(state, most, until, due, interrupted)
+                found = stepper.integrate(state, most, until, min(due, look), interrupted)
             except SimulationError:
                 self.termination = Termination.FAILED.value
                 raise
-            self.statistics.update(found, int(state.step[0] - before), self._stepper)
+            self.statistics.update(found, int(state.step[0] - before), stepper)
+        self._show_due(begin)
         self._look_out(found.done)
         self._look_at_strips(found.done)
-        for attached in self.attached:
-            attached.observe_due()
         return found
+
+    def _show_due(self, begin: Capture | None) -> None:
+        """Show what is due up to now, after a step that has one due in it and the start of which was captured."""
+        due = [attached for attached in self.attached if attached.is_due()]
+        if not due:
+            return
+        end = Capture(self._stepper, self._state)
+        span = StepSpan(begin or end, end, self._stepper.surroundings)
+        for attached in due:
+            attached.observe_due(lambda time: make_frame(span.at(time), self.statistics, self.cpu_time))
 
     def _look_out(self, steps: int, last: bool = False) -> None:
         """Look out of the plane now and then, after so many more steps; the first look needs more of the program."""
-        if self._plane_watch is None or not self._plane_watch.is_due(steps, last):
+        if self._plane_watch is None or not self._plane_watch.is_due(steps, self._time, last):
             return
         with self.timed():
             self._plane_watch.look(self._state, self._stepper.surroundings.load_factor(self._state))
 
+    @property
+    def _strips_due(self) -> float:
+        """Time of the next look at strips, unless so many steps come before [s]."""
+        model = self._stepper.model
+        return self._looked + PART_TO_LOOK * model.scene.duration if len(model.flattening.joint) else math.inf
+
     def _look_at_strips(self, steps: int, last: bool = False) -> None:
         """Look for strips that have folded, after so many more steps."""
         self._since_look += steps
-        if not last and self._since_look < STEPS_TO_LOOK:
+        if not last and self._since_look < STEPS_TO_LOOK and self._time < self._strips_due:
             return
-        self._since_look = 0
+        self._since_look, self._looked = 0, self._time
         with self.timed():
             found = folds(self._stepper.model, self._state)
         for name, shape in found.items():
@@ -238,13 +256,17 @@ class RunLoop:
             raise InputError(f"duration: {left:g} s is less than half a step of {steps.dt:g} s; nothing would happen")
         self.compile()
         begin, cpu, wall, before = self._time, self.cpu_time, wall_time(), self._state.step[0]
-        end = begin + count * steps.dt if fixed else self._stepper.end_near(begin + left if until is None else until)
+        end = begin + count * steps.dt if fixed else begin + left if until is None else until
         last = end - 0.5 * steps.dt if fixed else end
         schedule = Schedule(observers, observed)
         ends_of_listening = [self._controls.listen(of.note) for of in observers if hasattr(of, "note")]
         try:
             schedule.start()
-            termination = self._advance(end, last, schedule, inputs, callbacks)
+            self.attached.append(schedule)
+            try:
+                termination = self._advance(end, last, inputs, callbacks)
+            finally:
+                self.attached.remove(schedule)
             if termination is Termination.COMPLETED:
                 self._look_out(0, last=True)
                 self._look_at_strips(0, last=True)
@@ -264,9 +286,7 @@ class RunLoop:
         done = int(self._state.step[0] - before)
         return RunResult(termination, self._time, self._time - begin, done, self.cpu_time - cpu, wall_time() - wall)
 
-    def _advance(
-        self, end: float, last: float, schedule: Schedule, inputs: Sequence[Input], callbacks: Callbacks
-    ) -> Termination:
+    def _advance(self, end: float, last: float, inputs: Sequence[Input], callbacks: Callbacks) -> Termination:
         """Make steps until the end of a run, or until someone ends it.
 
         Parameters
@@ -275,8 +295,6 @@ class RunLoop:
             Where the last adaptive step ends [s].
         last : float
             A step that ends here or later is the last [s].
-        schedule : Schedule
-            Of the observers.
         inputs : sequence of Input
         callbacks : Callbacks
 
@@ -289,10 +307,9 @@ class RunLoop:
             while waiting and waiting[0].time <= self._time:
                 waiting.popleft().apply(self._controls)
             until = min(end, waiting[0].time) if waiting else end
-            found = self.integrate(callbacks.steps_at_once, until, schedule.next_due(), callbacks.interrupted)
+            found = self.integrate(callbacks.steps_at_once, until, callbacks.interrupted)
             if not found.done:
                 return Termination.INTERRUPTED
-            schedule.observe_due()
             if callbacks.each_step is not None:
                 callbacks.each_step(self._time)
             if callbacks.progress is not None:

@@ -31,7 +31,7 @@ from bilayer_core.observed.observer import Observer
 from bilayer_core.printable import html_table
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.loader import load_content, load_scene, scene_content
-from bilayer_core.simulation.capture import make_frame
+from bilayer_core.simulation.capture import Capture, make_frame
 from bilayer_core.simulation.controls import Controls
 from bilayer_core.simulation.energy_budget import EnergyLedger
 from bilayer_core.simulation.equilibrium import StaticReport, solve_static
@@ -373,7 +373,7 @@ class Simulator:
             The present values.
         """
         self.compile()
-        return make_frame(self._stepper, self._state, self.time, self.statistics, self.cpu_time)
+        return make_frame(Capture(self._stepper, self._state), self.statistics, self.cpu_time)
 
     def set_stimulus(self, channel: str, value: float | None, *, over: float = 0.0) -> None:
         """Set a channel from the next step on, in its unit.
@@ -540,8 +540,7 @@ class Simulator:
         Parameters
         ----------
         until : float
-            Simulated time [s] at which an adaptive step ends at the latest, if the scene's next output time is not
-            earlier; a fixed one is as long as ever.
+            Simulated time [s] at which an adaptive step ends at the latest; a fixed one is as long as ever.
 
         Returns
         -------
@@ -584,10 +583,9 @@ class Simulator:
     ) -> RunResult:
         """Advance by a duration or to a time (default: to the end of the scene), showing frames to observers.
 
-        Fixed steps end within half a step of it. Adaptive ones end exactly there, or at the output time that differs
-        from it by rounding alone, and at all of the scene's output times (`output.rate`, counted from time 0), whether
-        or not anybody observes: the run is the same bit for bit whatever watches it. So is a run in parts that meet at
-        output times; at another time the end of a part is one more end of a step.
+        Fixed steps end within half a step of it, adaptive ones exactly there. No step ends where an observer is due, so
+        the run is the same bit for bit whatever watches it; frames within a step are interpolated
+        (`simulation.step_span`). A run in parts has one more end of a step where the parts meet.
 
         Parameters
         ----------
@@ -604,8 +602,8 @@ class Simulator:
         overwrite : bool
             Replace that file if it exists.
         observers : sequence of Observer
-            Each sees the first frame, the last, and at its rate between that of the first step which ends at or after
-            each due time; all are closed whatever happens. For those that look at more than one run see `attach`.
+            Each sees the first frame, the last, and those at its rate between, each of its own time; all are closed
+            whatever happens. For those that look at more than one run see `attach`.
         inputs : sequence of Input
             What acts from outside (`observed.inputs`), each from its time on: adaptive steps end there, of fixed ones
             it acts from the first that begins then or later.

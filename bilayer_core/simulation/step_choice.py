@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from bilayer_core.engine.step_size import LONG_STEP
 from bilayer_core.errors import InputError
 from bilayer_core.integrators.method import Method
 from bilayer_core.scene.config import DEFAULT_DT, DEFAULT_TOLERANCE, LARGEST_TOLERANCE, SceneConfig
@@ -89,10 +90,10 @@ def choose_steps(scene: SceneConfig, method: Method, dt: float | None = None, to
             tolerance = DEFAULT_TOLERANCE
             reason = f"neither `dt` nor `tolerance` is given; {WORTH_OF_DEFAULT}"
     length = max(rod.path.length for rod in scene.rods)
-    longest = 1.0 / scene.output.rate if solver.max_step is None else solver.max_step
+    longest = _longest(scene.duration) if solver.max_step is None else solver.max_step
     newton = solver.newton_tolerance
     if newton is None:
-        newton = NEWTON_PART * (tolerance or DEFAULT_TOLERANCE) * length / longest
+        newton = NEWTON_PART * (tolerance or DEFAULT_TOLERANCE) * length / min(scene.duration, LONG_STEP)
     dt, halvings = dt or DEFAULT_DT, solver.max_halvings
     first = dt if tolerance is None else min(dt, longest)
     shortest, least_travel = first / 2 ** (DEFAULT_HALVINGS if halvings is None else halvings), math.inf
@@ -100,6 +101,11 @@ def choose_steps(scene: SceneConfig, method: Method, dt: float | None = None, to
         shortest = min(shortest, SHORTEST_PART * _time_of_sound(scene))
         least_travel = SHORTEST_PART * tolerance * length
     return Steps(dt, tolerance, longest, shortest, least_travel, newton, reason)
+
+
+def _longest(duration: float) -> float:
+    """Return how long an adaptive step may be where nothing else ends it, in a scene of a duration [s]."""
+    return max(SLOWEST_PART * duration, min(LONG_STEP, FASTEST_PART * duration))
 
 
 def _time_of_sound(scene: SceneConfig) -> float:
@@ -111,6 +117,14 @@ def _time_of_sound(scene: SceneConfig) -> float:
     )
 
 
+FASTEST_PART, SLOWEST_PART = 1.0 / 100.0, 1.0 / 250.0
+"""Of the duration of the scene: what the longest adaptive step may be of a short one, and of a long one.
+
+The error of a step does not see growth from almost nothing, such as buckling and swings that a drive pumps up: both are
+below the tolerance for long, and methods that damp what is fast suppress them in steps that are too long for them. The
+time that somebody gives a scene tells which motions matter. A long scene has 250 steps at least; a short one, which has
+less to rest in, a hundred of at most `LONG_STEP`.
+"""
 DEFAULT_HALVINGS = 10
 SHORTEST_PART = 1e-3
 """Of two times: in the first sound passes an edge, in the second the fastest point covers what a step may be wrong by.
@@ -123,10 +137,11 @@ their own: what rests on a stiff one has no speed, and what meets it has its err
 NEWTON_PART = 1e-2
 """What Newton's last correction may come to, as a part of the error that a step may have.
 
-A correction at speed u moves a point by at most u h in a step of length h. With u = part × tolerance × L/h_max, L the
-longest rod, that is at most this part of the error allowed in the longest step, and of a smaller one in proportion.
+A correction at speed u moves a point by at most u h in a step of length h. With u = part × tolerance × L/h₀, L the
+longest rod, that is at most this part of the error allowed in a step of length h₀, and of a smaller one in proportion.
+h₀ is `LONG_STEP`, or the scene's duration if that is shorter; in longer steps u falls with their length.
 The correction is taken, so what is left is less by another factor: below `engine.newton.KEEP_FACTOR_BELOW` where
 the matrix is an old one, by the correction itself where it is new. The scales are the scene's own, so u fits
-robots of a micrometre, which move in microseconds, as it fits one of a kilometre; for a rod of 50 mm recorded at 50 Hz
-it is 2.5e-6 m/s. Where this is less than positions can express, the last digit of a position counts (`engine.newton`).
+robots of a micrometre, which move in microseconds, as it fits one of a kilometre; for a rod of 50 mm it is
+2.5e-6 m/s. Where this is less than positions can express, the last digit of a position counts (`engine.newton`).
 """

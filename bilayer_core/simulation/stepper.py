@@ -18,6 +18,7 @@ from bilayer_core.engine.observables import Observables, observables_of
 from bilayer_core.engine.request_modes import EVALUATE_STATE
 from bilayer_core.engine.step import LEAST_LENGTH
 from bilayer_core.engine.step_outcome import FAILURES, IntegrationReport
+from bilayer_core.engine.step_size import reach
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.integrators.method import Method
 from bilayer_core.model.model import Model
@@ -119,7 +120,7 @@ class Stepper:
         first = min(steps.dt, steps.longest) if steps.adaptive else steps.dt
         rounding = TIME_ROUNDING if steps.adaptive else FIXED_ROUNDING
         self.same_time = max(first * rounding, LAST_DIGITS * model.scene.duration)
-        self._first = first
+        self._first, self._longest = first, steps.longest if steps.adaptive else steps.dt
         self.surroundings = Surroundings(model, ahead=2.0 * first)
         return StepControl(
             dt=0.0 if steps.adaptive else steps.dt,
@@ -128,8 +129,7 @@ class Stepper:
             first=first,
             shortest=steps.shortest,
             least_travel=steps.least_travel,
-            longest=steps.longest if steps.adaptive else steps.dt,
-            output_rate=float(model.scene.output.rate),
+            longest=self._longest,
             same=self.same_time,
         )
 
@@ -186,14 +186,10 @@ class Stepper:
         state.next_step[0] = min(float(state.next_step[0]), self._first)
         state.last_error[0] = 0.0
 
-    def end_near(self, time: float) -> float:
-        """Return the output time that a time [s] equals up to rounding, otherwise the time itself.
-
-        In this way a sum of periods counts as an output time.
-        """
-        rate = self.model.scene.output.rate
-        output = round(time * rate) / rate if math.isfinite(time) else time
-        return output if abs(output - time) <= TIME_ROUNDING / rate else time
+    def reach(self, state: State) -> float:
+        """Return a time that the next step from a state does not pass [s]."""
+        planned = float(state.next_step[0])
+        return float(state.time[0]) + reach.py_func(min(planned, self._longest) if planned > 0.0 else self._first)
 
     def integrate(
         self,
@@ -212,7 +208,7 @@ class Stepper:
         until : float
             Where the last adaptive step ends [s]; a fixed one ends within half a step of it.
         due : float
-            The first step that ends there or later is the last [s].
+            The last step is the first that ends there or later, or one after which the next might (`reach`) [s].
         interrupted : callable, optional
             Asked now and then, within long steps too; if true, steps end as `PAUSED`.
 

@@ -29,9 +29,13 @@ class Periods:
         """Return how many have ended at `time` [s], to rounding."""
         return math.floor((time - self._start) * self.rate + ROUNDING)
 
+    def end(self, count: int) -> float:
+        """Return the end [s] of so many periods."""
+        return self._start + count / self.rate
+
     def next_end(self, time: float) -> float:
         """Return the end [s] of the period that has not ended at `time` [s]."""
-        return self._start + (self.complete(time) + 1) / self.rate
+        return self.end(self.complete(time) + 1)
 
     def time_to_nearest_end(self, time: float) -> float:
         """Return the time from `time` [s] to the end of a period that is nearest to one period later [s]."""

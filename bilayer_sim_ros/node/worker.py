@@ -13,8 +13,8 @@ from typing import Any, Protocol
 
 from bilayer_core.errors import InputError, OutputError
 from bilayer_core.log.messages.events import Event, changed_setting, ended_run
-from bilayer_core.observed.frame import Frame
-from bilayer_core.simulation.observers import TIME_ROUNDING
+from bilayer_core.observed.frame import Description, Frame
+from bilayer_core.simulation.observers import STAMP_DIGITS, TIME_ROUNDING
 from bilayer_core.simulation.run_result import Termination
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_sim_ros.control.control_ticks import Control
@@ -46,6 +46,54 @@ class Publisher(Protocol):
 
     def tell(self, event: Event) -> None:
         """Send an event that frames do not show."""
+
+
+class FramesOfSteps:
+    """Observer that keeps the frames that are due within a step, for the worker to hand out.
+
+    Parameters
+    ----------
+    periods : Periods
+        Of frames.
+
+    Attributes
+    ----------
+    due : float
+        Time of the next one, to the nanosecond of its messages [s].
+    """
+
+    rate = math.inf
+
+    def __init__(self, periods: Periods):
+        self._periods = periods
+        self._frames: list[Frame] = []
+        self.restart(0.0)
+
+    def restart(self, time: float) -> None:
+        """Begin to count at a time [s]."""
+        self._count = self._periods.complete(time)
+        self._next()
+
+    def _next(self) -> None:
+        self._count += 1
+        self.due = round(self._periods.end(self._count), STAMP_DIGITS)
+
+    def start(self, description: Description) -> None:
+        """Do nothing: the worker hands out the first frame."""
+
+    def observe(self, frame: Frame) -> None:
+        """Keep a frame if it is due."""
+        if round(frame.time, STAMP_DIGITS) >= self.due:
+            self._frames.append(frame)
+            self._next()
+
+    def close(self, complete: bool, termination: str = "") -> None:
+        """Do nothing."""
+
+    def take(self) -> list[Frame]:
+        """Return the frames of the last step."""
+        frames, self._frames = self._frames, []
+        return frames
 
 
 class SimulationWorker:
@@ -98,8 +146,10 @@ class SimulationWorker:
         self._publisher = publisher
         self._recording = recording
         self._frames = Periods(rate)
+        self._due = FramesOfSteps(self._frames)
+        simulator.attach(self._due)
         self._marker_rate = marker_rate
-        refuse_rate(simulator, rate)
+        refuse_rate(rate)
         self._pacer = pacer
         self._duration = duration
         self._stop_listening: Callable[[], None] = lambda: None
@@ -245,6 +295,7 @@ class SimulationWorker:
     def _begin(self) -> None:
         """Start a run at the simulator's present state, and hand out its first frame."""
         self._frames.start(self._simulator.time)
+        self._due.restart(self._simulator.time)
         self._pacer.restart(self._simulator.time)
         self._reporter.start(self._simulator.time)
         self._recording.start(self._simulator.description)
@@ -282,50 +333,48 @@ class SimulationWorker:
 
     def _advance(self) -> None:
         """Take one step, and show what is due at its end."""
-        start, cpu, wall = self._simulator.time, self._simulator.cpu_time, self._simulator.wall_time
+        cpu, wall = self._simulator.cpu_time, self._simulator.wall_time
         self._control.act(self._simulator)
         self._reporter.add(self._simulator.step(until=self._next_stop()))
         cpu, wall = self._simulator.cpu_time - cpu, self._simulator.wall_time - wall
         self._reporter.spend(PHYSICS, cpu)
         self._reporter.spend(OTHERS, max(wall - cpu, 0.0))
         self._frame_is_out = False
-        now = self._simulator.time
-        frame_is_due = self._frames.complete(now) > self._frames.complete(start)
-        if frame_is_due:
-            self._hand_out()
-        elif self._control.opens_tick(now):
+        now, frames = self._simulator.time, self._due.take()
+        for frame in frames:
+            self._hand_out(frame)
+        if not self._frame_is_out and self._control.opens_tick(now):
             self._publish(self._paused)
         self._control.advance_to(now)
-        if self._single_steps and (frame_is_due or self._is_over()):
+        if self._single_steps and (frames or self._is_over()):
             self._single_steps.popleft().set_result(f"paused at t = {now:.6g} s")
 
     def _next_stop(self) -> float:
-        """Return where adaptive steps end at the latest, beside the scene's own output times [s].
+        """Return where adaptive steps end at the latest [s]: when a controller is due, or the run ends.
 
-        That is when a controller or a frame is due, or the run ends. Frames at a smaller rate than the scene's are
-        those of the first step after their time.
+        In real time, and one by one, they end at frames too, so that what comes from outside acts within a period.
         """
         now = self._simulator.time
         due = self._control.next_stop(now)
-        if self._simulator.tolerance is not None and self._frames.rate > self._simulator.scene.output.rate:
+        if self._pacer.factor > 0.0 or self._single_steps:
             due = min(due, self._frames.next_end(now))
         return due if due < self._duration - TIME_ROUNDING * self._simulator.dt else self._duration
 
-    def _hand_out(self) -> None:
-        """Publish and record the present frame."""
-        self._frame_is_out = True
-        frame = self._publish(self._paused)
+    def _hand_out(self, frame: Frame | None = None) -> None:
+        """Publish and record a frame, by default the present one."""
+        self._frame_is_out = frame is None or frame.time == self._simulator.time
+        frame = self._publish(self._paused, frame)
         if self._recording.wanted:
             frame = frame or self._simulator.frame()
             with self._reporter.spending(LOG):
                 self._recording.observe(frame)
 
-    def _publish(self, everything: bool) -> Frame | None:
-        """Publish the present frame if anybody subscribes to it; the frame."""
+    def _publish(self, everything: bool, frame: Frame | None = None) -> Frame | None:
+        """Publish a frame, by default the present one, if anybody subscribes to it; the frame."""
         self._shown_at = time.monotonic()
         if not self._publisher.wanted:
-            return None
-        frame = self._simulator.frame()
+            return frame
+        frame = frame or self._simulator.frame()
         with self._reporter.spending(SUBSCRIBERS):
             self._publisher.publish(frame, everything=everything)
         return frame
@@ -363,8 +412,9 @@ class SimulationWorker:
         answer.set_result("")
 
     def _do_set_rates(self, rate: float, marker_rate: float, answer: Future) -> None:
-        refuse_rate(self._simulator, rate)
+        refuse_rate(rate)
         self._frames.rate, self._marker_rate = rate, marker_rate
+        self._due.restart(self._simulator.time)
         self._publisher.set_rates(rate, marker_rate)
         self._recording.set_rates(rate, marker_rate)
         text = f"rate is {rate:g} Hz, marker_rate is {min(rate, marker_rate):g} Hz"

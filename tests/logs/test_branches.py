@@ -10,6 +10,7 @@ from PIL import Image
 from bilayer_core import Simulator, load_scene
 from bilayer_core.cli import main
 from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.log.run.log_reader import read_state
 from bilayer_core.runs.branches import Varied, run_branches
 from bilayer_core.runs.replay import branch
 
@@ -31,7 +32,7 @@ def test_each_branch_is_the_run_that_goes_on_with_its_value(log):
         simulator, inputs = branch(log, 0.1, stimuli={"swelling": of.value})
         simulator.run(until=0.2, inputs=inputs)
         np.testing.assert_array_equal(of.run.com[-1], simulator.com)
-        assert of.run.times[0] == 0.1 and of.run.times[-1] == 0.2
+        assert of.run.times[0] == read_state(log, 0.1)[0][0] <= 0.1 and of.run.times[-1] == 0.2
     ends = [of.run.com[-1, 2] for of in found]
     assert len(set(ends)) == 3
 
@@ -93,7 +94,9 @@ def test_branches_are_overlaid_in_one_recording(log, tmp_path, capsys):
     out = tmp_path / "branches.rrd"
     command = ["replay", str(log), "--from", "0.1", "--vary", "stimulus.swelling=0:1:12", "--rrd", str(out)]
     assert main(command) == 0
-    assert "12 branches from t = 0.1 s to 0.2 s by stimulus.swelling" in capsys.readouterr().out
+    begin, told = read_state(log, 0.1)[0][0], capsys.readouterr()
+    assert begin < 0.1 and f"12 branches from t = {begin:g} s to 0.2 s by stimulus.swelling" in told.out
+    assert f"begins at t = {begin:.9g} s, where the last logged step before t = 0.1 s ended" in told.err
     with HeadlessViewer() as viewer:
         viewer.open(out)
         found = {item.entity_path for item in viewer.client.get_recording_schema(paths_only=True).entities}

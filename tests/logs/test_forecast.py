@@ -9,7 +9,8 @@ from bilayer_core.cli import main
 from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_core.runs.forecast import forecast
 
-MOST_OFF = 0.2
+LARGEST, SMALLEST = 1.2, 0.35
+"""Of a log over what is expected of it: a state is only written where a step has ended since the last frame."""
 
 
 @pytest.mark.parametrize(
@@ -29,7 +30,7 @@ def test_a_forecast_is_near_the_size_of_the_log(scene, changes, tmp_path):
     expected = forecast(simulator)
     simulator.run(simulator.scene.duration, observers=[recorder(simulator.scene, tmp_path)])
     written = (tmp_path / "run.mcap").stat().st_size
-    assert expected.total == pytest.approx(written, rel=MOST_OFF)
+    assert SMALLEST * expected.total < written < LARGEST * expected.total
 
 
 def recorder(scene, directory):

@@ -114,9 +114,9 @@ def test_a_run_goes_on_from_its_log_bit_for_bit(tmp_path):
     Simulator(load_scene("gripping")).run(0.04, observers=[McapRecorder(path)])
     again = Simulator(load_scene(yaml.safe_load(scene_from_log(path))))
     middle, moment = read_state(path, 0.02)
-    assert moment == 0.02
+    assert 0.01 < moment <= 0.02
     again.load_state(middle)
-    again.run(0.02)
+    again.run(until=0.04)
     np.testing.assert_array_equal(again.save_state(), read_state(path)[0])
 
 
@@ -184,10 +184,11 @@ def test_a_log_of_a_killed_process_is_readable_up_to_its_last_second(tmp_path):
     info = read_info(path)
     assert info.scene == "synthetic"
     survivors = info.topics["/clock"]["count"]
-    assert info.last_time == pytest.approx(0.02 * (survivors - 1))
+    begun = round(info.last_time / 0.02) - (survivors - 1)
+    assert begun in (0, 1)  # the state comes before all else
     lost = survivors - len(read_log(path).times)
     assert lost in (0, 1)  # a chunk may end within a frame
-    assert read_state(path)[1] == pytest.approx(info.last_time, abs=0.02 * lost)
+    assert read_state(path)[1] == pytest.approx(info.last_time)
 
 
 @pytest.mark.parametrize("missing", [1, 7, 500, 30_000, 100_000])

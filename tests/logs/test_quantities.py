@@ -159,11 +159,10 @@ def test_a_run_that_ends_earlier_is_not_equal_to_the_longer_one(bent, tmp_path, 
     simulator.set_stimulus(next(iter(simulator.scene.stimuli)), 0.5)
     simulator.run(0.2, observers=[McapRecorder(shorter, rate=50.0)])
     found = compare(shorter, bent / "half.mcap")
-    assert not found.equal and all(of.largest == 0.0 for of in found.differences)
+    assert not found.equal and 0.0 < found["com"].largest < 1e-6  # the end of a run ends a step
     assert main(["compare", str(shorter), str(bent / "half.mcap")]) == 1
     told = capsys.readouterr().out
     assert f"{shorter} has t = 0 to 0.2 s" in told and "half.mcap has t = 0 to 0.4 s" in told
-    assert "equal to the last bit of the logs, as far as both go" in told
 
 
 def test_every_term_of_energy_has_a_name_that_logs_are_read_with(tmp_path):

@@ -80,7 +80,7 @@ def test_the_estimate_does_not_depend_on_the_mesh():
 def test_a_ball_bounces_ever_nearer_to_where_it_fell_from(integrator):
     """The barrier is elastic: what lacks is the integrator's loss, in the impact most of all."""
     losses = []
-    data = falling(max_step=0.02) | {"output": {"rate": 1.0, "marker_rate": 1.0}}  # no output time near an impact
+    data = falling(max_step=0.02)
     for tolerance in (1e-4, 1e-5) if integrator == "implicit_euler" else (1e-4, 1e-5, 1e-6):
         simulator, heights = Simulator(load_scene(data), tolerance=tolerance, integrator=integrator), []
         simulator.run(
@@ -115,6 +115,23 @@ def test_what_lies_on_a_barrier_does_not_hold_steps_up():
     simulator = simulate(dropped, 1.0, tolerance=1e-5, integrator="sdirk2")
     assert np.abs(simulator.velocities).max() < 1e-4
     assert part(simulator, "next_step")[0] == pytest.approx(simulator.steps.longest)
+
+
+@pytest.mark.parametrize(("duration", "longest"), [(0.1, 1e-3), (3.0, 0.02), (50.0, 0.2)])
+def test_the_longest_step_follows_from_the_duration_and_not_from_the_rate(duration, longest):
+    for rate in (5.0, 500.0):
+        config = load_scene(cantilever() | {"duration": duration, "output": {"rate": rate, "marker_rate": rate}})
+        assert Simulator(config, tolerance=1e-4).steps.longest == pytest.approx(longest)
+
+
+def test_newton_leaves_no_longer_a_way_in_a_long_step_than_in_one_of_20_ms():
+    slow = driven() | {"duration": 50.0}
+    slow["stimuli"]["heat"]["schedule"] = {"type": "ramp", "start": 0, "end": 50, "from": 0, "to": 1}
+    simulator, reports = Simulator(load_scene(slow), tolerance=1e-4), []
+    while simulator.time < 50.0:
+        reports.append(simulator.step(until=50.0))
+    most = 0.02 * simulator.steps.newton_tolerance
+    assert max(of.residual * of.length for of in reports) <= most and reports[-1].length > 0.1
 
 
 # what steps leave
@@ -164,7 +181,7 @@ def test_the_energy_budget_closes_over_adaptive_steps():
 
 
 def test_a_step_in_which_newton_fails_is_shortened_and_the_run_goes_on():
-    kicked = {**cantilever(), "solver": {**PAPER, **EXACT, "dt": 2e-2, "max_newton_iterations": 6}}
+    kicked = {**cantilever(), "solver": {**PAPER, **EXACT, "dt": 2e-2, "max_step": 2e-2, "max_newton_iterations": 6}}
     kicked["loads"][0]["schedule"] = {"type": "hold", "value": 3.0}
     simulator = Simulator(load_scene(kicked), tolerance=0.1, integrator="sdirk2")
     reports = [simulator.step(until=0.1)]

@@ -275,4 +275,4 @@ def test_contact_at_rest_has_no_error_of_its_own():
     simulator.run(1.0)
     before = simulator.statistics.steps
     simulator.run(1.0)
-    assert simulator.statistics.steps - before <= 1.0 / simulator.steps.longest + 21  # and some end at output times
+    assert simulator.statistics.steps - before <= 1.0 / simulator.steps.longest + 21

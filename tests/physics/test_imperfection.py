@@ -6,6 +6,7 @@ from support.sample_scenes import fixed, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SceneError
+from bilayer_core.log.run.memory import MemoryRecorder
 from bilayer_core.model.imperfect_shapes import departure
 from bilayer_core.model.plan import MODELS
 from bilayer_core.scene.bundled import bundled_scenes
@@ -101,15 +102,9 @@ def test_a_strut_that_grows_buckles_at_a_time_of_its_own():
     """Without an imperfection it stays straight as long as no rounding bends it: here for ever."""
 
     def time_of_snap(config):
-        simulator, found = Simulator(config), []
-        nodes = simulator.model.node_count
-
-        def look(time):
-            if np.abs(simulator.positions[:nodes, 2]).max() > 5e-4:
-                found.append(time)
-
-        simulator.run(each_step=look)
-        return found[0] if found else None
+        simulator, seen = Simulator(config), MemoryRecorder(rate=1e4)  # steps of milliseconds would round the time
+        simulator.run(observers=[seen])
+        return next((of.time for of in seen.frames if np.abs(of.positions[:, 2]).max() > 5e-4), None)
 
     assert time_of_snap(strut()) is None
     imperfect = {"shape": "random", "size": 1e-5, "seed": 3}

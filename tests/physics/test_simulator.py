@@ -116,7 +116,7 @@ def test_observers_see_the_first_frame_the_last_and_their_rate_between(simulator
     result = simulator.run(0.05, observers=[fast, slow])
     assert result.termination is Termination.COMPLETED and result.steps == 50
     assert [f.step for f in fast.frames] == list(range(0, 51, 2))
-    assert [f.step for f in slow.frames] == [0, 15, 29, 43, 50]
+    assert [f.step for f in slow.frames] == [0, 14, 28, 42, 50]  # done at 0, 1/70, 2/70, 3/70 and 0.05 s
     assert fast.closed is True and slow.closed is True
     assert fast.frames[-1].substeps == slow.frames[-1].substeps == simulator.statistics.substeps
 
@@ -136,7 +136,7 @@ def test_an_interrupted_run_tells_its_observers(simulator):
     result = simulator.run(0.05, observers=[recorder], interrupted=lambda: simulator.time > 0.0225)
     assert result.termination is Termination.INTERRUPTED
     assert (recorder.closed, recorder.termination) == (False, "interrupted")
-    assert recorder.frames[-1].time == pytest.approx(0.03)  # asked whenever someone has looked
+    assert 0.0225 < recorder.frames[-1].time == simulator.time < 0.031  # asked whenever someone has looked
     assert simulator.summary()["termination"] == "interrupted"
 
 

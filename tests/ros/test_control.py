@@ -41,9 +41,9 @@ class Driven:
             self.log.observe(self.simulator.frame())
         self.control.start(self.simulator.time)
 
-    def step(self):
+    def step(self, until=math.inf):
         self.control.act(self.simulator)
-        self.simulator.step(until=self.control.next_stop(self.simulator.time))
+        self.simulator.step(until=min(until, self.control.next_stop(self.simulator.time)))
         self.control.advance_to(self.simulator.time)
         if self.log:
             self.log.observe(self.simulator.frame())
@@ -52,7 +52,7 @@ class Driven:
         """Step; `send` is called before each step."""
         while self.simulator.time < until - 1e-9:
             send(self.simulator.time)
-            self.step()
+            self.step(until)
         return self
 
     @property

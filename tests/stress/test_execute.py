@@ -50,7 +50,8 @@ def test_a_scene_that_cannot_be_is_refused_with_its_reason():
 
 
 def test_a_run_that_cannot_go_on_is_refused_and_its_remedy_tried():
-    content = scene([rod([layer()])], solver={"dt": 2e-2, "max_halvings": 0, "tolerance": 1e-4, "integrator": "sdirk2"})
+    one_length = {"dt": 2e-2, "max_step": 2e-2, "max_halvings": 0}
+    content = scene([rod([layer()])], solver={**one_length, "tolerance": 1e-4, "integrator": "sdirk2"})
     content["loads"] = [{"name": "kick", "rod": "rod", "position": 0.03, "force": [0, 0, 1e-2]}]
     record = execute(StressCase("a stop", lambda: content | {"duration": 0.05}))
     assert record.outcome is Outcome.REFUSED

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bilayer_core.engine.step_size import completed, next_end
+from bilayer_core.simulation.observers import completed, next_end
 
 
 @pytest.mark.parametrize("rate", [7.0, 50.0, 93.0, 1000.0 / 3.0])

@@ -107,11 +107,11 @@ class Chain:
         return Link(self._states, self._inputs, self._hash.hexdigest())
 
 
-def place_of_seal(description: Description) -> int | None:
-    """Return where the seal stands in a flat state, or None if states have none."""
+def place_in_state(description: Description, part: str) -> int | None:
+    """Return where a part begins in a flat state, or None if states have none of its name."""
     place = 0
     for name, shape in description.state_layout:
-        if name == "seal":
+        if name == part:
             return place
         place += math.prod(shape)
     return None
@@ -162,7 +162,7 @@ def check_chain(path: str | Path, description: Description) -> Wholeness:
         return Wholeness(True, False, "its scene, versions, machine, settings or description were changed")
     expected = iter(links if end is None else [*links, end])
     wanted, good, last = next(expected, None), None, None
-    seal = place_of_seal(description)
+    seal = place_in_state(description, "seal")
     for topic, time, data in LogFile(path).messages({STATE, INPUTS.full_name()}):
         if topic == STATE:
             chain.add_state(time, _sound_seal(decoded(path, topic, time, data, read_float64_multi_array)[1], seal))

@@ -8,6 +8,7 @@ and the end of the chain; written at the end, so a log without it was cut off).
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import threading
@@ -18,7 +19,7 @@ from pathlib import Path
 
 from bilayer_core.errors import InputError, OutputError, SimulationError
 from bilayer_core.log.file.backlog import Backlog
-from bilayer_core.log.file.chain import CHAIN, END, Chain, place_of_seal
+from bilayer_core.log.file.chain import CHAIN, END, Chain, place_in_state
 from bilayer_core.log.file.lock import open_alone, refuse_file_in_use
 from bilayer_core.log.file.log_head import SCENE_ATTACHMENT
 from bilayer_core.log.file.output_paths import check_output_path, unwritable
@@ -42,6 +43,7 @@ MESSAGE_SIZE = 31  # of a message beside its data [bytes]
 QUEUE_LENGTH = 64  # frames waiting for the writer; some megabytes
 LONGEST_SILENCE = 10.0  # after which a log with a patience is given up at its end [s of wall time]
 SUFFIX = ".mcap"
+STATE_NAME = "state"
 
 
 class McapRecorder:
@@ -325,10 +327,14 @@ class _LogFile:
         self._events = EventDetector(description)
         self._file = open_alone(path, force)
         self._names = {
-            shown: [spec.name for spec in self._encoder.topics if shown or spec.rate is not Rate.DISPLAY]
+            shown: [
+                spec.name
+                for spec in self._encoder.topics
+                if spec.name != STATE_NAME and (shown or spec.rate is not Rate.DISPLAY)
+            ]
             for shown in (False, True)
         }
-        self._has_markers = False
+        self._has_markers, self._state_time = False, math.nan
         self._in_chunk = self._sequence = 0
         self._unflushed_since: float | None = None
         self._synced = clock.monotonic()
@@ -348,7 +354,8 @@ class _LogFile:
             }
             for name, metadata in head.items():
                 self._log.add_metadata(name, metadata)
-            self._chain, self._seal = Chain(description.scene_text, head), place_of_seal(description)
+            self._chain, self._seal = Chain(description.scene_text, head), place_in_state(description, "seal")
+            self._time = place_in_state(description, "time")
             self._add_link()
             topics = (*self._encoder.topics, *self._clouds.topics, *input_topics(description))
             self._topics = self._announce(topics)
@@ -401,8 +408,8 @@ class _LogFile:
             self._unflushed_since = clock.monotonic()
 
     def _write_frame(self, frame: Frame) -> None:
+        self._write_state(frame)
         stamp, display = nanoseconds(frame.time), self._gate.is_due(frame.time)
-        self._chain.add_state(stamp, 0.0 if self._seal is None else frame.state[self._seal])
         for name in self._names[display]:
             data = self._encoder.encode(name, frame)
             if name == MARKERS and not self._has_markers:
@@ -410,6 +417,15 @@ class _LogFile:
             self._add(name, stamp, data)
         for name, data in self._clouds.encode(frame) if display else ():
             self._add(name, stamp, data)
+
+    def _write_state(self, frame: Frame) -> None:
+        """Write the state of the last step before a frame at its own time, once for all frames of the next one."""
+        time = frame.time if self._time is None else float(frame.state[self._time])
+        if time == self._state_time:
+            return
+        self._state_time, stamp = time, nanoseconds(time)
+        self._chain.add_state(stamp, 0.0 if self._seal is None else frame.state[self._seal])
+        self._add(STATE_NAME, stamp, self._encoder.encode(STATE_NAME, frame))
 
     def _add_events(self, events: list[Event]) -> None:
         for event in events:

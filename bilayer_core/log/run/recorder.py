@@ -43,8 +43,7 @@ class Recorder(Recorded):
     quantities : str or sequence of str
         Names, such as ``"com"``, or patterns, such as ``"body/*/position"``; all by default. See `log.run.quantities`.
     rate : float
-        Times in each simulated second: when the first step ends after each multiple of its period, or exactly there.
-        No step is another for it.
+        Times in each simulated second, at the multiples of its period. No step is another for it.
 
     Raises
     ------

@@ -30,7 +30,7 @@ TRIALS = 100
 """Runs, by default."""
 CONFIRMED = 0.02
 """Largest relative difference to the run with finer steps by which a value is confirmed."""
-FINER_TOLERANCE, FINER_STEP = 0.1, 0.25
+FINER_TOLERANCE, FINER_LONGEST, FINER_STEP = 0.1, 0.5, 0.25
 """Of that run, over those of the others."""
 SEED_STEP = 1_000_003
 """Between the seeds of searches that were continued after other numbers of runs."""
@@ -337,12 +337,13 @@ def _finer(search: Search, engine: Engine, row: Row) -> float | None:
 def finer_job(job: Job, parameters: Values) -> Job:
     """Return the same runs with finer steps, without logs.
 
-    Steps have a tenth of the tolerance, or a quarter of the fixed step.
+    Steps have a tenth of the tolerance and half the longest step, or a quarter of the fixed step.
     """
     simulator = Simulator(scene_of(job, parameters))
     content = json.loads(job.scene)
     if simulator.tolerance is not None:
-        changes = {"solver.tolerance": FINER_TOLERANCE * simulator.tolerance}
+        tolerance, longest = FINER_TOLERANCE * simulator.tolerance, FINER_LONGEST * simulator.steps.longest
+        changes = {"solver.tolerance": tolerance, "solver.max_step": longest}
     else:
         changes = {"solver.dt": FINER_STEP * simulator.dt}
     return replace(job, scene=json.dumps(scene_content(load_content(content, changes))), logs="none")
