@@ -27,6 +27,7 @@ WORKS = {
     "run": ["cantilever", "--duration", "2 ms", "--log", "simulated.mcap", "--summary", "run.json", "--quiet"],
     "converge": ["cantilever", "--duration", "2 ms", "--workers", "1"],
     "validate": ["--only", "laminate/two*", "--quick"],
+    "design": ["cantilever", "--target", "curve.csv", "--vary", "gravity.2=-20:-1", "--quiet"],
     "info": ["run.mcap"],
     "repair": ["run.mcap", "repaired.mcap"],
     "compare": ["run.mcap", "run.mcap"],
@@ -41,6 +42,11 @@ NEEDS = [
     (["optimise", "sweep.yaml", "--maximise", "x"], "dask", "sweep"),
     (
         ["fit", "cantilever", "--data", "data.csv", "--parameter", "damping.mass=0:20", "--out", "fit"],
+        "matplotlib",
+        "plot",
+    ),
+    (
+        ["design", "cantilever", "--target", "curve.csv", "--vary", "gravity.2=-20:-1", "--out", "designed"],
         "matplotlib",
         "plot",
     ),
@@ -105,6 +111,7 @@ def ended(tmp_path_factory, python):
     synthetic_run.run(McapRecorder(here / "run.mcap"), np.arange(3) * 0.02)
     (here / "sweep.yaml").write_text(SWEEP)
     (here / "data.csv").write_text("time,com.z [m]\n0,0\n0.001,0\n0.002,0\n")
+    (here / "curve.csv").write_text("x,y,z\n0,0,0\n0.01,0,0\n0.02,0,0\n0.03,0,0\n")
     (here / "run_all.py").write_text(RUN_ALL)
     commands = [[verb, *more] for verb, more in WORKS.items()] + [arguments for arguments, _, _ in NEEDS]
     done = subprocess.run(

@@ -92,7 +92,7 @@ ANEW = {
     "two rods/stimulus": ("bending", HANGING | TWO_RODS, SWOLLEN, "swelling"),
     "two rods/length": ("bending", HANGING | TWO_RODS, SWOLLEN, "rods.strip.path.length"),
     "strip/stimulus": ("bending", HANGING | STRIP, {"swelling": 0.1}, "swelling"),
-    "helix/gravity": ("helix", {"gravity": [0, 0, -0.2]}, {}, "gravity.2"),
+    "two rods in space/gravity": ("helix", {"gravity": [0, 0, -0.2]}, {}, "gravity.2"),
     "gripper/density": ("gripping", {}, {"humidity": 0.8}, "materials.film.density"),
 }
 TOUCHING = {
