@@ -377,7 +377,7 @@ def freeze_surface_contacts(sliding, p, at, stage):
 
 @kernel
 def _project(sliding, k, x):
-    """Project a vector onto the tangent plane of a contact."""
+    """Make a vector tangential to the surface at a contact."""
     n = sliding.normal
     along = x[0] * n[k, 0] + x[1] * n[k, 1] + x[2] * n[k, 2]
     for c in range(3):
