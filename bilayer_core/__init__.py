@@ -1,8 +1,8 @@
 """Simulation of bilayer soft robots: scenes, the numerical core, logs, pictures and the command line.
 
 ``load_scene``, ``Simulator``, ``Recorder``, ``estimate_error``, ``fit``, ``design``, ``read_log``, ``compare``,
-``sweep``, ``optimise``, ``read_results``, ``__version__`` and the classes of scenes (``Scene``, ``Rod``, ``Layer``, ...)
-are loaded at their first use: importing the package costs nothing.
+``sweep``, ``optimise``, ``read_results``, ``__version__`` and the classes of scenes (``Scene``, ``Rod``, ``Layer``,
+...) are loaded at their first use: importing the package costs nothing.
 """
 
 from __future__ import annotations
