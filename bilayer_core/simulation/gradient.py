@@ -18,25 +18,29 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.errors import InputError, SceneError, SimulationError
-from bilayer_core.log.run.quantities import Entry, unknown_quantity
+from bilayer_core.log.run.frame_values import FrameValues
+from bilayer_core.log.run.quantities import entries, unknown_quantity
 from bilayer_core.model.lit_elements import light_of, part_seen
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import AT_REST, Configuration
 from bilayer_core.model.state import State, reached_at_rest
+from bilayer_core.observed.frame import Description
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.loader import load_content, scene_content
 from bilayer_core.scene.overrides import read_overrides
-from bilayer_core.simulation.capture import make_frame
+from bilayer_core.simulation.capture import Capture, make_frame
 from bilayer_core.simulation.equilibrium import solve_static
 from bilayer_core.simulation.gains import alike_but_gains, put_gains
+from bilayer_core.simulation.observation import strand
 from bilayer_core.simulation.statistics import RunStatistics
 from bilayer_core.simulation.stepper import Stepper
 
@@ -119,10 +123,21 @@ class Nearby:
         Value of each channel, shape (n_channel,).
     gains : ndarray, optional
         Of the model's laws, shape (n_law,): they are put in place where this model is evaluated.
+    description : Description
+        Of a run of the model that it is near to.
     """
 
-    def __init__(self, stepper: Stepper, evaluator: Evaluator, state: State, stimulus: Array, gains: Array | None):
+    def __init__(
+        self,
+        stepper: Stepper,
+        evaluator: Evaluator,
+        state: State,
+        stimulus: Array,
+        gains: Array | None,
+        description: Description,
+    ):
         self._stepper, self._evaluator, self._stimulus, self._gains = stepper, evaluator, stimulus, gains
+        self._near = description
         self.state, self._light = state, light_of(stepper.model)
         self._load_factor = stepper.surroundings.load_factor(state)
         self._reach(state)
@@ -190,16 +205,19 @@ class Nearby:
         evaluator.start_stage(at)
         return at
 
-    def values(self, state: State, wanted: Sequence[Entry]) -> list[Array]:
-        """Return quantities at a state."""
+    @cached_property
+    def _description(self) -> Description:
+        """Description with the sections of this model, from which the middle lines of rods are derived."""
+        return replace(self._near, strands=tuple(map(strand, self._stepper.model.strands)))
+
+    def values(self, state: State, wanted: Sequence[str]) -> list[Array]:
+        """Return quantities at a state, by their names."""
         self._put_gains()
         self._stepper.evaluate(state)
-        frame = make_frame(self._stepper, state, float(state.time[0]), RunStatistics(), 0.0)
-        return [np.array(_value(frame, entry), dtype=float) for entry in wanted]
-
-
-def _value(frame: Any, entry: Entry) -> Any:
-    return getattr(frame, entry.attribute)[entry.index]
+        frame = make_frame(Capture(self._stepper, state), RunStatistics(), 0.0)
+        known = {entry.name: entry for entry in entries(self._description, frame.energy, ())}
+        in_frames = FrameValues(self._description)
+        return [np.asarray(in_frames.of(known[name], frame), dtype=float) for name in wanted]
 
 
 @dataclass(frozen=True)
@@ -263,6 +281,8 @@ class Equilibrium:
         Near rest; it is left as it is.
     model_of, stepper_of, state_of : callable
         Make the model of a scene, and the stepper and the first state of a model.
+    description : Description
+        Of a run of the stepper's model.
 
     Attributes
     ----------
@@ -284,8 +304,9 @@ class Equilibrium:
         model_of: Callable[[SceneConfig], Model],
         stepper_of: Callable[[Model], Stepper],
         state_of: Callable[[Model], State],
+        description: Description,
     ):
-        model = stepper.model
+        model, self._description = stepper.model, description
         self._model_of, self._stepper_of, self._state_of, self._start = model_of, stepper_of, state_of, state_of(model)
         self.scene, self._size = model.scene, max(rod.path.length for rod in model.scene.rods)
         self._gains = model.drives.law_gain.copy()
@@ -379,7 +400,7 @@ class Equilibrium:
 
     def _here(self, stimulus: Array, gains: Array) -> Nearby:
         """Return the present model with other stimuli or gains."""
-        return Nearby(self._stepper, self._evaluator, self._state.copy(), stimulus, gains)
+        return Nearby(self._stepper, self._evaluator, self._state.copy(), stimulus, gains, self._description)
 
     def _with(self, change: dict[str, float]) -> Nearby:
         """Return the model with another number in its scene."""
@@ -393,7 +414,7 @@ class Equilibrium:
         if state is None:
             raise InputError(f"gradient: {path} changes how many unknowns the model has")
         stimulus = stepper.surroundings.stimulus_at(state, float(state.time[0]))
-        return Nearby(stepper, Evaluator(model), state, stimulus, None)
+        return Nearby(stepper, Evaluator(model), state, stimulus, None, self._description)
 
     def _carried(self, model: Model) -> State | None:
         """Return the state of another model that departs from its start as the present one does."""
@@ -544,7 +565,7 @@ def _tangents(model: Model, position: Array) -> Array:
     return vector / np.linalg.norm(vector, axis=1, keepdims=True)
 
 
-def differentiate(here: Equilibrium, known: Sequence[Entry], of: Sequence[str], to: Sequence[str]) -> Gradient:
+def differentiate(here: Equilibrium, known: Collection[str], of: Sequence[str], to: Sequence[str]) -> Gradient:
     """Return the derivatives of quantities by parameters.
 
     Raises
@@ -552,31 +573,29 @@ def differentiate(here: Equilibrium, known: Sequence[Entry], of: Sequence[str], 
     InputError
         If there is no such quantity or parameter, or a parameter acts on nothing.
     """
-    by_name = {entry.name: entry for entry in known}
     for name in of:
-        if name not in by_name:
-            raise unknown_quantity(name, by_name)
-    wanted = [by_name[name] for name in of]
+        if name not in known:
+            raise unknown_quantity(name, known)
     derivatives: dict[tuple[str, str], Array] = {}
     errors: dict[tuple[str, str], Array] = {}
     for name, parameters in here.parameters(to).items():
-        columns = [_column(here, parameter, wanted) for parameter in parameters]
+        columns = [_column(here, parameter, of) for parameter in parameters]
         single = len(parameters) == 1 and parameters[0].name == name
-        for k, entry in enumerate(wanted):
+        for k, quantity in enumerate(of):
             for found, part in ((derivatives, 0), (errors, 1)):
                 stacked = np.stack([column[k][part] for column in columns], axis=-1)
-                found[entry.name, name] = stacked[..., 0] if single else stacked
+                found[quantity, name] = stacked[..., 0] if single else stacked
     return Gradient(derivatives, errors, here.residual)
 
 
-def _column(here: Equilibrium, parameter: Parameter, wanted: Sequence[Entry]) -> list[tuple[Array, Array]]:
+def _column(here: Equilibrium, parameter: Parameter, wanted: Sequence[str]) -> list[tuple[Array, Array]]:
     """Return the derivative of each quantity by a parameter, and the size of its error."""
     response = here.respond(parameter)
     slopes, largest = [], []
     for motion in (response.motion, response.motion + response.correction * -1.0):
         rows = [
-            of.values(of.moved(motion * (place * response.h)), wanted)
-            for of, place in zip(response.nearby, PLACES, strict=True)
+            nearby.values(nearby.moved(motion * (place * response.h)), wanted)
+            for nearby, place in zip(response.nearby, PLACES, strict=True)
         ]
         slopes.append([_slope(row, response.h) for row in zip(*rows, strict=True)])
         largest = [max(float(np.abs(value).max(initial=0.0)) for value in row) for row in zip(*rows, strict=True)]
@@ -584,6 +603,6 @@ def _column(here: Equilibrium, parameter: Parameter, wanted: Sequence[Entry]) ->
     if not response.moves and all(m <= NOTHING * most for m, most in zip(moved, largest, strict=True)):
         raise InputError(
             f"gradient: {parameter.name} acts on nothing here: neither the shape at rest nor "
-            f"{', '.join(entry.name for entry in wanted)} depends on it; leave it out"
+            f"{', '.join(wanted)} depends on it; leave it out"
         )
     return [(one, np.abs(one - other)) for one, other in zip(*slopes, strict=True)]

@@ -126,7 +126,8 @@ class PlaneWatch:
         self._growth += 0.5 * (rate + self._rate) * (time - self._time)
         self._unstable += rate > 0.0
         self._time, self._rate = time, rate
-        self._since_look, self._next = 0, min(self._done, MOST_STEPS)
+        first_found = rate > 0.0 and self._unstable == 1  # what one look found, the next one soon confirms or not
+        self._since_look, self._next = 0, FIRST_LOOK if first_found else min(self._done, MOST_STEPS)
         if self._growth >= GROWTH and self._unstable > 1:
             self.since = time
 

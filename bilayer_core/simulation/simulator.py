@@ -691,7 +691,7 @@ class Simulator:
         Parameters
         ----------
         of : str or sequence of str
-            Quantities by the names that logs have: ``"com"``, ``"rod/strip/laminate/position"``, ``"energy/bending"``,
+            Quantities by the names that logs have: ``"com"``, ``"rod/strip/position"``, ``"energy/bending"``,
             ``"body/wall/clamp_wrench"``.
         to : str or sequence of str
             Channels of stimuli, and paths of numbers in the scene, or of lists of numbers, as ``--set`` takes them:
@@ -712,7 +712,7 @@ class Simulator:
         here = self._equilibrium()
         asked = [[names] if isinstance(names, str) else list(names) for names in (of, to)]
         known = [
-            entry
+            entry.name
             for entry in entries(self.description, self.energy(), ())
             if not entry.name.startswith("stimulus/") and not entry.name.endswith("/frame")
         ]
@@ -725,7 +725,7 @@ class Simulator:
         def model_of(scene: SceneConfig) -> Model:
             return build_model(scene, self.plan.model, self.plan.dimension)
 
-        return Equilibrium(self._stepper, self._state, model_of, self._stepper_of, self._state_of)
+        return Equilibrium(self._stepper, self._state, model_of, self._stepper_of, self._state_of, self.description)
 
     def save_state(self) -> Array:
         """Return a flat copy of the state; `load_state` continues from it bit for bit.

@@ -34,6 +34,7 @@ def seen(simulator, of):
     }
     for name, body in simulator.bodies.items():
         values[f"body/{name}/clamp_wrench"] = body.clamp_wrench
+    values |= {f"rod/{name}/position": rod.middle_line for name, rod in simulator.rods.items()}
     return [np.asarray(values[name]) for name in of]
 
 
@@ -130,14 +131,22 @@ def test_at_the_default_tolerance_the_residual_bounds_the_error():
     assert error(found["com", "swelling"], exact["com", "swelling"]) < 1e-9
 
 
+@pytest.mark.parametrize("model", ["laminate", "two_rod"])
+def test_middle_lines_move_with_the_layers_that_they_are_the_middle_of(model):
+    scene, of = HANGING | {"solver.model": model}, ["rod/strip/position"]
+    (reference,) = differences("bending", scene, SWOLLEN, THICKNESS, 1e-3, of)
+    found = at_rest("bending", scene, SWOLLEN).gradient(of, THICKNESS)
+    assert error(found[of[0], THICKNESS], reference) < 1e-6
+
+
 def test_a_list_of_numbers_gives_a_column_for_each():
     profile = {"at": [0.0, 0.1], "value": [1e-3, 1e-3]}
     scene = HANGING | {THICKNESS: profile}
-    found = at_rest("bending", scene, SWOLLEN).gradient("rod/strip/laminate/position", [f"{THICKNESS}.value"])
-    columns = found["rod/strip/laminate/position", f"{THICKNESS}.value"]
-    whole = at_rest("bending", HANGING, SWOLLEN).gradient("rod/strip/laminate/position", THICKNESS)
+    found = at_rest("bending", scene, SWOLLEN).gradient("rod/strip/position", [f"{THICKNESS}.value"])
+    columns = found["rod/strip/position", f"{THICKNESS}.value"]
+    whole = at_rest("bending", HANGING, SWOLLEN).gradient("rod/strip/position", THICKNESS)
     assert columns.shape == (41, 3, 2)
-    assert error(columns.sum(axis=2), whole["rod/strip/laminate/position", THICKNESS]) < 1e-8
+    assert error(columns.sum(axis=2), whole["rod/strip/position", THICKNESS]) < 1e-8
 
 
 def test_a_state_away_from_rest_is_refused_with_how_far_it_is():

@@ -22,7 +22,7 @@ def file_names(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str
     Parameters
     ----------
     names : iterable of str
-        Such as ``rod/strip/laminate/position``.
+        Such as ``rod/strip/position``.
     taken : iterable of str
         Paths that are not to be used.
     """

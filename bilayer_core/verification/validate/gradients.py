@@ -57,8 +57,8 @@ def height(name: str, overrides: dict[str, Any], stimuli: dict[str, float], to: 
 def curvature_per_swelling() -> tuple[float, float]:
     """Measure how the curvature of a free bilayer depends on the stimulus, in the middle, in 1/m."""
     simulator = at_rest("bending", {}, {"swelling": 0.6})
-    found = simulator.gradient("rod/strip/laminate/curvature", "swelling")
-    return abs(float(found["rod/strip/laminate/curvature", "swelling"][20])), 1.5 * 0.01 / 2e-3
+    found = simulator.gradient("rod/strip/curvature", "swelling")
+    return abs(float(found["rod/strip/curvature", "swelling"][20])), 1.5 * 0.01 / 2e-3
 
 
 def weight_by_density() -> tuple[float, float]:
