@@ -25,26 +25,17 @@ class FrameValues:
         self._frame: Frame | None = None
         self._joined: dict[str, Array] = {}
 
-    def of(self, entry: Entry, frame: Frame, precision: type = float) -> Array:
-        """Return a copy of a quantity.
+    def of(self, entry: Entry, frame: Frame) -> Array:
+        """Return a copy of a quantity."""
+        return entry.derived(self.picked(entry, frame)[None])[0]
 
-        Parameters
-        ----------
-        entry : Entry
-        frame : Frame
-        precision : type
-            Of the numbers from which the quantity is derived, and of its values.
-
-        Returns
-        -------
-        ndarray
-        """
+    def picked(self, entry: Entry, frame: Frame, precision: type = float) -> Array:
+        """Return a copy of the numbers in a frame from which a quantity is derived; most are the quantity."""
         if entry.attribute == "energy":
             return np.array(frame.energy[str(entry.index)])
         if entry.attribute == "solver":
             return np.array(float(getattr(frame, str(entry.index))))
-        held = self._held(entry.attribute, frame)
-        return entry.taken(held[None], tuple(entry.index), precision)[0]
+        return np.array(self._held(entry.attribute, frame)[tuple(entry.index)], dtype=precision)
 
     def _held(self, attribute: str, frame: Frame) -> Array:
         if attribute not in ("material_frames", "nodes", "points"):

@@ -166,8 +166,11 @@ class Entry:
             Shape (rows, ...).
         """
         values: Array = held[(slice(None), *index)]
-        values = values if precision is None else values.astype(precision)
-        return values if self.derive is None else self.derive(values).astype(values.dtype, copy=False)
+        return self.derived(values if precision is None else values.astype(precision))
+
+    def derived(self, picked: Array) -> Array:
+        """Return the values of the quantity from what its index picks, shape (rows, ...)."""
+        return picked if self.derive is None else self.derive(picked).astype(picked.dtype, copy=False)
 
     def filled(self, times: Array, values: Array) -> Quantity:
         """Return the quantity with its values.

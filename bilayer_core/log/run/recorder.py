@@ -111,7 +111,7 @@ class Recorder(Recorded):
             del values[kept:]
         self._times.append(frame.time)
         for name, entry in self._entries.items():  # those of nodes in single precision, as in logs
-            self._values[name].append(self._in_frames.of(entry, frame, np.float32 if entry.of_shape else float))
+            self._values[name].append(self._in_frames.picked(entry, frame, np.float32 if entry.of_shape else float))
 
     def close(self, complete: bool, termination: str = "") -> None:
         """End the recording. The simulator calls this when the recorder is detached.
@@ -139,8 +139,11 @@ class Recorder(Recorded):
     @property
     def quantities(self) -> Mapping[str, Quantity]:
         """Quantities recorded so far, by name."""
-        times = self.times
-        return {name: entry.filled(times, np.array(self._values[name])) for name, entry in self._entries.items()}
+        times, found = self.times, {}
+        for name, entry in self._entries.items():
+            picked = np.array(self._values[name])
+            found[name] = entry.filled(times, entry.derived(picked) if len(picked) else picked)
+        return found
 
     def entries(self) -> dict[str, Entry]:
         """Return the entry of each quantity, by name: all that is known of it besides its values.
