@@ -1,6 +1,7 @@
 """What a recorder gets of real nodes is read as their own logs are, to the last digit."""
 
 import functools
+import struct
 import time
 
 import numpy as np
@@ -39,6 +40,7 @@ class Recorder:
                 take = functools.partial(self._take, topic, ros_type)
                 node.create_subscription(message_class(ros_type), topic, take, quality, raw=True)
         client.spin_until(lambda: len(self.count("/description")) == len(nodes), "the descriptions")
+        client.spin_until(lambda: all(self.count(f"{name}/com") for name in nodes), "frames of the start")
 
     def _take(self, topic, ros_type, data, information):
         self.messages.append((topic, ros_type, information["received_timestamp"], bytes(data)))
@@ -46,6 +48,11 @@ class Recorder:
     def count(self, topic):
         """The messages of the topics that end so."""
         return [message for message in self.messages if message[0].endswith(topic)]
+
+    def last_stamp(self, topic):
+        """Time in the header of the last message [s], which begins after four bytes of encapsulation."""
+        seconds, nanoseconds = struct.unpack_from("<iI", self.count(topic)[-1][3], 4)
+        return seconds + 1e-9 * nanoseconds
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +72,7 @@ def recorded(start, connect, domain_of_module, tmp_path_factory):
     assert client.call("reset").success
     count = len(recorder.count("/bilayer_sim/com"))
     client.spin_until(lambda: len(recorder.count("/bilayer_sim/com")) > count + 15, "frames of the second run")
-    client.spin_until(lambda: len(recorder.count(f"{OTHER}/com")) > 12, "frames of the other node")
+    client.spin_until(lambda: recorder.last_stamp(f"{OTHER}/com") > 0.299, "the last frame of the other node")
     own.end()
     client.drain()
     for bag, prefix in (("own", "/bilayer_sim/"), ("other", f"{OTHER}/"), ("both", "/")):
