@@ -26,11 +26,33 @@ class FrameValues:
         self._joined: dict[str, Array] = {}
 
     def of(self, entry: Entry, frame: Frame) -> Array:
-        """Return a copy of a quantity."""
+        """Return a copy of a quantity.
+
+        Parameters
+        ----------
+        entry : Entry
+        frame : Frame
+
+        Returns
+        -------
+        ndarray
+        """
         return entry.derived(self.picked(entry, frame)[None])[0]
 
     def picked(self, entry: Entry, frame: Frame, precision: type = float) -> Array:
-        """Return a copy of the numbers in a frame from which a quantity is derived; most are the quantity."""
+        """Return a copy of the numbers in a frame from which a quantity is derived; most are the quantity.
+
+        Parameters
+        ----------
+        entry : Entry
+        frame : Frame
+        precision : type
+            Of the copy.
+
+        Returns
+        -------
+        ndarray
+        """
         if entry.attribute == "energy":
             return np.array(frame.energy[str(entry.index)])
         if entry.attribute == "solver":

@@ -169,7 +169,18 @@ class Entry:
         return self.derived(values if precision is None else values.astype(precision))
 
     def derived(self, picked: Array) -> Array:
-        """Return the values of the quantity from what its index picks, shape (rows, ...)."""
+        """Return the values of the quantity from what its index picks.
+
+        Parameters
+        ----------
+        picked : ndarray
+            Shape (rows, ...).
+
+        Returns
+        -------
+        ndarray
+            Shape (rows, ...).
+        """
         return picked if self.derive is None else self.derive(picked).astype(picked.dtype, copy=False)
 
     def filled(self, times: Array, values: Array) -> Quantity:
