@@ -132,7 +132,7 @@ def test_a_settled_robot_can_start_in_motion():
     assert simulator.velocities[:, 2] == pytest.approx(1.0)
 
 
-def test_a_strip_that_the_border_of_a_box_would_push_aside_settles_where_friction_holds_it():
+def test_a_strip_pushed_by_the_border_of_a_box_settles_where_friction_holds_it():
     """Friction's law has no force at rest, so it creeps by 1e-11 m/s. The stride is that of a beam on both barriers,
     solved by finite differences.
     """
