@@ -180,7 +180,7 @@ def _go_on(path: str, moment: float, options: dict[str, Any]) -> None:
     with interrupt, progress_bar(simulator.scene.name, begin, begin + duration, options["quiet"]) as show:
         simulator.run(duration, observers=observers, interrupted=interrupt.grant, progress=show, inputs=inputs)
     if not options["quiet"]:
-        for line in summary_lines({**simulator.summary(), "duration": duration}, set()):
+        for line in summary_lines({**simulator.summary(), "duration": duration}, set(), False):
             say(line)
     if interrupt.granted:
         raise Interruption(interrupt.wished)

@@ -66,6 +66,7 @@ OUTPUT_SUFFIXES = {"log": ".mcap", "rrd": ".rrd", "summary": ".json", "save_stat
 @click.option("--error-estimate", is_flag=True, help=ERROR_HELP)
 @click.option("--quarter-step", is_flag=True, help=QUARTER_HELP)
 @click.option("--force", is_flag=True, help="Replace existing files.")
+@click.option("--verbose", is_flag=True, help="Tell all figures, and what was chosen for the scene.")
 @click.option("--quiet", is_flag=True, help="Neither progress nor summary.")
 def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: bool, **options: Any) -> None:
     """Simulate SCENE as fast as this machine can."""
@@ -292,7 +293,7 @@ def _write_outputs(
 def _tell(simulator: Simulator, summary: dict[str, Any], options: dict[str, Any], judge: _Judge | None) -> None:
     """Print what happened."""
     moved = {body.name for body in simulator.scene.bodies if body.motion.type != "prescribed"}
-    for line in summary_lines(summary, moved):
+    for line in summary_lines(summary, moved, options["verbose"]):
         say(line)
     for key in OUTPUT_SUFFIXES:
         if options[key] and Path(options[key]).exists():

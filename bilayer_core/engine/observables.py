@@ -12,6 +12,7 @@ from bilayer_core.engine.kinetic import kinetic_energy
 from bilayer_core.forces.added_mass import fluid_momentum, move_fluid
 from bilayer_core.forces.bend_twist import bending_strain
 from bilayer_core.forces.joints import Joints
+from bilayer_core.forces.mechanisms import turned
 from bilayer_core.jit import kernel, piece, record, shapes_of, zeros_in_one
 from bilayer_core.jit.record import Flags, IndexTable, Indices, Matrix, Vector
 from bilayer_core.kinematics.copying import copy
@@ -45,6 +46,8 @@ class Observables:
     touching_count: Indices = (1,)
     touched: Flags = ("owner squared",)  # scratch
     owners: int  # n of the pairs
+    pair_of: IndexTable  # number of a pair of owners among those whose forces are seen, −1 of others, shape (n, n)
+    mechanism_joint: Indices  # whose each mechanism is, −1 of guided bodies, shape (n_mechanism,)
     values: Vector
     strain: Vector = ("observed point",)  # of nodes, the mean of their edges', with eigenstrain; 0 at points of bodies
     curvature: Vector = ("observed point",)  # χ of nodes [1/m]
@@ -53,6 +56,9 @@ class Observables:
     contact_wrench: Matrix = ("body", 6)  # contact force [N] and moment about its position [N m] on every body
     clamp: Matrix = ("attached", 6)  # the part of each held node with its direction in the next
     clamp_wrench: Matrix = ("body", 6)  # of the rods that each body holds [N, N m], see `_observe_clamps`
+    pair_force: Vector = ("seen pair",)  # sum of the normal forces between two owners [N]
+    joint_wrench: Matrix = ("body joint", 6)  # that each exerts on its first body, about the joint [N, N m]
+    motion: Vector = ("mechanism",)  # angle or way of each [rad, m]
     energy: Vector = ("force",)  # of each force, in the order of `model.force_slots` [J]
     kinetic: Vector = (2,)  # of rods and bodies, and of the fluid [J]
 
@@ -64,6 +70,7 @@ def observe(p, joints, state, at, out):
     _observe_contact(p, joints, out)
     _observe_clamps(p, at, out)
     _observe_touching(p, out)
+    _observe_joints(p.mechanisms, joints, at, out)
     for b in range(out.quaternion.shape[0]):
         r = state.body_rotation
         x, y, z, w = quaternion_of(
@@ -153,24 +160,30 @@ def _observe_clamps(p, at, out):
 
 @kernel
 def _observe_touching(p, out):
-    """Write the pairs of owners that are nearer to each other than the barrier distance to `out`, each pair once."""
+    """Write the pairs of owners that are nearer to each other than the barrier distance to `out`, each pair once, and
+    the normal forces between them.
+    """
     surfaces, rods, of_point, count = p.surfaces, p.rod_contact, out.owner_of_point, 0
+    out.pair_force[:] = 0.0
     if surfaces.exists:
         for k in range(surfaces.near_count[0]):
             if surfaces.near_gap[k] < surfaces.d_hat:
                 surface = out.owner_of_surface[surfaces.near_surface[k]]
-                count = _note(of_point[surfaces.near_contact_point[k]], surface, count, out)
+                count = _note(of_point[surfaces.near_contact_point[k]], surface, surfaces.near_force[k], count, out)
     if rods.exists:
         for k in range(rods.contacts.count[0]):
-            count = _note(of_point[rods.contacts.node[k, 0]], of_point[rods.contacts.node[k, 1]], count, out)
+            first, second = of_point[rods.contacts.node[k, 0]], of_point[rods.contacts.node[k, 1]]
+            count = _note(first, second, rods.contacts.normal_force[k], count, out)
     for k in range(count):
         out.touched[out.touching[k]] = False
     out.touching_count[0] = count
 
 
 @kernel
-def _note(a, b, count, out):
-    """Add a pair unless it is known; how many there are."""
+def _note(a, b, force, count, out):
+    """Add a pair unless it is known, and the force of one of its contacts; how many pairs there are."""
+    if out.pair_of[a, b] >= 0:
+        out.pair_force[out.pair_of[a, b]] += force
     number = min(a, b) * out.owners + max(a, b)
     if out.touched[number]:
         return count
@@ -178,19 +191,44 @@ def _note(a, b, count, out):
     return count + 1
 
 
+@kernel
+def _observe_joints(mechanisms, joints, at, out):
+    """Write what joints exert on the first of their bodies, and the angles and ways of mechanisms, to `out`."""
+    if joints.exists:
+        for k in range(out.joint_wrench.shape[0]):
+            for c in range(6):
+                out.joint_wrench[k, c] = -joints.gradient[2 * k, c]
+    if mechanisms.exists:
+        copy(mechanisms.value, out.motion)
+        for i in range(out.mechanism_joint.shape[0]):
+            k = out.mechanism_joint[i]
+            if k >= 0:
+                for c in range(6):
+                    out.joint_wrench[k, c] -= mechanisms.gradient[2 * i, c]
+    for k in range(out.joint_wrench.shape[0]):  # from the body's position to the joint
+        arm = turned(at.rotation, joints.body[2 * k], joints.arm, 2 * k)
+        moment = cross(arm, row(out.joint_wrench, k))
+        for c in range(3):
+            out.joint_wrench[k, 3 + c] -= moment[c]
+
+
 COMPUTED = tuple(name for name in Observables.shapes if name not in ("touching", "touching_count", "touched"))
 """Names of the observables, in the order of their values."""
 
 
 def observables_of(
-    model: Model, owner_of_point: Array, owner_of_surface: Array, owners: int
+    model: Model, owner_of_point: Array, owner_of_surface: Array, pair_of: Array
 ) -> tuple[Observables, dict[str, tuple[int, int, tuple[int, ...]]]]:
     """Return the record of a model, and the begin, end and shape of each part of its values by name.
 
-    The owners of contact points and surfaces are numbers below `owners`.
+    The owners of contact points and surfaces are numbers of rows of `pair_of`, the table of pairs.
     """
+    owners = len(pair_of)
     sizes = sizes_of(model) | {"observed point": model.node_count + model.point_count}
     sizes |= {"pair of owners": owners * (owners + 1) // 2, "owner squared": owners**2}
+    sizes |= {"seen pair": int(pair_of.max(initial=-1)) + 1, "body joint": len(model.scene.joints)}
+    sizes |= {"mechanism": len(model.mechanisms)}
+    joint_of = {joint.name: k for k, joint in enumerate(model.scene.joints)}
     values, parts = zeros_in_one(shapes_of(Observables, sizes, COMPUTED))
     ends = np.cumsum([0, *(parts[name].size for name in COMPUTED)]).tolist()
     places = {name: (*ends[k : k + 2], parts[name].shape) for k, name in enumerate(COMPUTED)}
@@ -205,6 +243,8 @@ def observables_of(
         owner_of_point=owner_of_point,
         owner_of_surface=owner_of_surface,
         owners=owners,
+        pair_of=pair_of,
+        mechanism_joint=np.array([-1 if m.is_guide else joint_of[m.owner] for m in model.mechanisms], dtype=np.int64),
         values=values,
         **parts,
     )

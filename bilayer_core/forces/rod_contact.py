@@ -265,6 +265,7 @@ def _add_barrier(rods, position, gradient):
         scale = 0.5 * contacts.multiplicity[c] * rods.stiffness * rods.point_weight[contacts.point[c]]
         energy += scale * barrier(d, d_hat)
         slope = scale * barrier_gradient(d, d_hat)
+        contacts.normal_force[c] = -slope
         curvature = scale * barrier_hessian(d, d_hat)
         tangential = slope / distance
         contacts.tangential_stiffness[c] = tangential

@@ -70,7 +70,7 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
         i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
         x = place_of(surfaces, at, k)
         d, n[0], n[1], n[2], p0, p1, p2 = gap_normal(surfaces, at, surfaces.near_radius[k], s, x[0], x[1], x[2])
-        surfaces.near_gap[k] = d
+        surfaces.near_gap[k], surfaces.near_force[k] = d, 0.0
         if d < d_hat and stands_aside(surfaces, k):
             continue
         min_gap = min(min_gap, d)
@@ -93,6 +93,7 @@ def add_surface_barrier(surfaces, p, at, stage, with_hessian):
                 lost -= slope * part * (d - origin) / stage.length
         curvature = stiffness * barrier_hessian(d, d_hat) * (elastic - part) - beta * slope
         slope *= elastic - part
+        surfaces.near_force[k] = -slope
         node = surfaces.near_node[k]
         for c in range(3):
             g[c] = slope * n[c]

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
+"""Parts of a wrench."""
+
 
 def strain_at(offset: np.ndarray, strain: np.ndarray, curvature: np.ndarray, at_start: np.ndarray) -> np.ndarray:
     """Return the axial strain at a distance y = `offset` from a curve, in a section that stays plane: (1 + ε − yχ)/(1 −
@@ -167,6 +170,10 @@ class Description:
     joints : tuple of JointInfo
     channel_units : tuple of str
         Unit of each channel, empty for none.
+    contact_pairs : tuple of (str, str)
+        What can touch, and `Frame.pair_forces` are of: a rod, a body or an obstacle, and another.
+    joint_figures : tuple of str
+        Names of `Frame.joint_figures` among quantities; those of wrenches end with ``wrench``, and have six numbers.
     """
 
     scene_name: str
@@ -183,11 +190,21 @@ class Description:
     settings: dict[str, str] = field(default_factory=dict)
     joints: tuple[JointInfo, ...] = ()
     channel_units: tuple[str, ...] = ()
+    contact_pairs: tuple[tuple[str, str], ...] = ()
+    joint_figures: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         counts = f"{len(self.strands)} strands, {self.node_count} nodes, {len(self.bodies)} bodies"
         channels = ", ".join(self.channels) or "none"
         return f"Description({self.scene_name}: {counts}, {len(self.obstacles)} obstacles; channels: {channels})"
+
+    @property
+    def joint_labels(self) -> list[str]:
+        """Name of each number in `Frame.joint_figures`, such as ``joint/wrist/wrench.fx``."""
+        of_wrench = [f".{part}" for part in WRENCH]
+        return [
+            name + part for name in self.joint_figures for part in (of_wrench if name.endswith("/wrench") else [""])
+        ]
 
     @property
     def layers(self) -> tuple[Strand, ...]:
@@ -251,6 +268,10 @@ class Frame:
         large; those that made energy.
     beyond_limits : tuple of str
         For each limit of the model that the run has passed since its start, what it is and what that means.
+    pair_forces : ndarray
+        Sum of the normal forces of each of `Description.contact_pairs` [N], shape (pairs,).
+    joint_figures : ndarray
+        Wrenches, angles and ways of joints [N, N m, rad, m], as `Description.joint_labels` names them.
     """
 
     time: float
@@ -280,6 +301,8 @@ class Frame:
     contacts: tuple[tuple[str, str], ...] = field(default_factory=tuple)  # which leaves no attribute of the class
     rejected: tuple[int, int, int] = (0, 0, 0)
     beyond_limits: tuple[str, ...] = ()
+    pair_forces: np.ndarray = field(default_factory=lambda: np.empty(0))
+    joint_figures: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     def __repr__(self) -> str:
         counts = f"{len(self.positions)} nodes, {len(self.body_positions)} bodies"

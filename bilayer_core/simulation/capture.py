@@ -65,6 +65,8 @@ _DERIVED: dict[str, Callable[[Any], Any]] = {
     "body_angular_velocities": lambda of: of.state.body_angular_velocity,
     "contact_wrenches": lambda of: of.seen.contact_wrench,
     "clamp_wrenches": lambda of: of.seen.clamp_wrench,
+    "pair_forces": lambda of: of.seen.pair_force,
+    "joint_figures": lambda of: np.concatenate([of.seen.joint_wrench.ravel(), of.seen.motion]),
     "com": lambda of: center_of_mass(of.model, of.state),
     "contacts": lambda of: of.owners.names_of(of.touching),
     "energy": lambda of: energies(of.model, of.seen),

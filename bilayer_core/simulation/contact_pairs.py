@@ -1,15 +1,19 @@
-"""Pairs in contact: rods, bodies and obstacles that are nearer to each other than the barrier distance."""
+"""Pairs of rods, bodies and obstacles: which are nearer to each other than the barrier distance, and their forces."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations, product
 
 import numpy as np
 
 from bilayer_core.model.model import Model
+from bilayer_core.model.rod_pairs import rod_pairs
 
 Array = np.ndarray
 Pairs = tuple[tuple[str, str], ...]
-AN_OBSTACLE = "an obstacle"
-"""Whose corners touch a body: points of the world are not told apart."""
+MOST_TOLD = 1000
+"""Pairs of rods, or with a surface, up to which the force of each is told; a heap of rods has too many."""
 
 
 class ContactOwners:
@@ -21,31 +25,57 @@ class ContactOwners:
 
     Attributes
     ----------
-    count : int
-        How many owners there are.
     of_point, of_surface : Array
         Number of the owner of each contact point and surface, shape (n_contact_point,), (n_surface,).
+    pairs : tuple of (str, str)
+        Those that can touch, and whose forces are told.
+    pair_of : Array
+        Number of each pair in `pairs`, −1 for others, shape (owners, owners).
     """
 
     def __init__(self, model: Model):
+        scene, points = model.scene, model.surfaces
         rods = list(dict.fromkeys(strand.rod for strand in model.strands))
-        bodies = list(model.bodies.names)
-        surfaces = [name for name in model.surface_names if name not in bodies]
-        self._names = [*rods, *bodies, *surfaces, AN_OBSTACLE]
-        slot = {name: index for index, name in reversed(list(enumerate(self._names)))}
-        self.count = len(self._names)
+        self._names = [*rods, *model.bodies.names, *(obstacle.name for obstacle in scene.obstacles)]
         of_node = np.zeros(model.node_count, dtype=np.int64)
         for strand in model.strands:
             of_node[strand.first_node : strand.first_node + strand.node_count] = rods.index(strand.rod)
-        points, world = model.surfaces, self.count - 1
-        # nodes, points of bodies and of the world, points of rods with an arm from a node
-        of_bodies = np.array([*range(len(rods), len(rods) + len(bodies)), world])
-        self.of_point = np.concatenate([of_node, of_bodies[points.point_body], of_node[points.rod_points.node]])
-        self.of_surface = np.array([slot[name] for name in model.surface_names], dtype=np.int64)
+        # nodes, points of bodies and of obstacles, points of rods with an arm from a node
+        others = slice(model.node_count, model.node_count + len(points.point_body))
+        copies = len(rods) - len(scene.rods)  # friction knows rods by their patterns
+        self.of_point = np.concatenate([of_node, model.sliding.owner[others] + copies, of_node[points.rod_points.node]])
+        self.of_surface = model.sliding.surface_owner + copies
+        numbers = {name: number for number, name in enumerate(self._names)}
+        of_rods = {(numbers[a], numbers[b]) for a, b in _pairs_of_rods(model)}
+        found = sorted(pair for of in (of_rods, set(self._with_surfaces(model))) if len(of) <= MOST_TOLD for pair in of)
+        self.pairs = tuple((self._names[a], self._names[b]) for a, b in found)
+        self.pair_of = np.full((len(self._names),) * 2, -1, dtype=np.int64)
+        for number, (a, b) in enumerate(found):
+            self.pair_of[a, b] = self.pair_of[b, a] = number
+
+    def _with_surfaces(self, model: Model) -> Iterator[tuple[int, int]]:
+        points = model.surfaces
+        for surface, can_collide in zip(self.of_surface.tolist(), points.can_collide, strict=True):
+            for owner in np.unique(self.of_point[can_collide[points.group]]).tolist():
+                yield min(owner, surface), max(owner, surface)
 
     def names_of(self, touching: Array) -> Pairs:
         """Return the names of the pairs of what `engine.observables` saw touch: a rod comes before a body, and a body
         before an obstacle.
         """
-        pairs = (divmod(code, self.count) for code in sorted(touching.tolist()))
+        pairs = (divmod(code, len(self._names)) for code in sorted(touching.tolist()))
         return tuple((self._names[a], self._names[b]) for a, b in pairs)
+
+
+def _pairs_of_rods(model: Model) -> Iterator[tuple[str, str]]:
+    """Yield the names of rods that can touch, copies one by one."""
+    rods = model.scene.rods
+    for pair in rod_pairs(model.scene):
+        if pair.active:
+            first, second = rods[pair.first].copy_names, rods[pair.second].copy_names
+            if pair.copies:
+                yield from combinations(first, 2)
+            elif pair.first == pair.second:
+                yield from zip(first, first, strict=True)
+            else:
+                yield from product(first, second)

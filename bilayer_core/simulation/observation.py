@@ -24,7 +24,9 @@ from bilayer_core.simulation.step_choice import Steps
 Array = np.ndarray
 
 
-def describe(model: Model, state: State, plan: Plan, steps: Steps) -> Description:
+def describe(
+    model: Model, state: State, plan: Plan, steps: Steps, contact_pairs: tuple[tuple[str, str], ...]
+) -> Description:
     """Return the description of a run for observers: everything that does not change while it lasts."""
     scene = model.scene
     bodies = model.bodies
@@ -59,6 +61,14 @@ def describe(model: Model, state: State, plan: Plan, steps: Steps) -> Descriptio
         state_layout=state.layout(),
         settings=settings,
         joints=joint_shapes(model),
+        contact_pairs=contact_pairs,
+        joint_figures=(
+            *(f"joint/{joint.name}/wrench" for joint in scene.joints),
+            *(
+                f"{'body' if m.is_guide else 'joint'}/{m.owner}/{'travel' if m.slides else 'angle'}"
+                for m in model.mechanisms
+            ),
+        ),
     )
 
 

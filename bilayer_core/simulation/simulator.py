@@ -302,6 +302,11 @@ class Simulator:
         return joint_views(self._present)
 
     @property
+    def pair_forces(self) -> dict[tuple[str, str], float]:
+        """Sum of the normal forces between every two rods, bodies or obstacles that can touch [N]."""
+        return dict(zip(self.description.contact_pairs, self._present.seen().pair_force.tolist(), strict=True))
+
+    @property
     def curvatures(self) -> Array:
         """Curvature χ through the thickness at every node [1/m], shape (nodes,)."""
         return self._present.seen().curvature
@@ -362,7 +367,7 @@ class Simulator:
     @property
     def description(self) -> Description:
         """Description of the run: everything that does not change while it lasts."""
-        return describe(self.model, self._state, self.plan, self.steps)
+        return describe(self.model, self._state, self.plan, self.steps, self._stepper.contact_owners.pairs)
 
     def frame(self) -> Frame:
         """Return a snapshot.

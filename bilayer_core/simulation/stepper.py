@@ -150,7 +150,7 @@ class Stepper:
     @cached_property
     def _observables(self) -> tuple[Observables, Places]:
         owners = self.contact_owners
-        return observables_of(self.model, owners.of_point, owners.of_surface, owners.count)
+        return observables_of(self.model, owners.of_point, owners.of_surface, owners.pair_of)
 
     def observe(self, state: State) -> tuple[Parts, np.ndarray]:
         """Return the observables of a state that was reached or evaluated last, by their names in `engine.observables`,

@@ -34,7 +34,8 @@ def summarise(simulator: Any) -> dict:
     ``max_strain`` (of an edge, without its eigenstrain), ``max_fibre_strain`` (of the outermost fibres beyond the shape
     at rest), ``max_curvature_by_thickness``, ``com_max_height``, ``min_gap``, ``max_contact_force``, and of
     bodies ``lift``, the greatest height over that at the start, ``first_contact`` and ``most_contact_nodes``. Of the
-    end: ``com_end``, ``mean_curvature``, ``tip_positions``, ``energy``, and of bodies ``end``, ``lift_end`` and
+    end: ``com_end``, ``displacement`` of the mass centre, ``pair_forces`` (normal forces of what touches),
+    ``mean_curvature``, ``tip_positions``, ``energy``, and of bodies ``end``, ``lift_end`` and
     ``contact_nodes``. ``largest_energy`` is that of motion, elasticity and contact together, with the potential of
     gravity from its value at the start, ``energy_through`` the energy that went through: that or, if it is more, what
     was supplied or lost in all steps. ``numerical_energy`` is what steps have made or, below zero, lost beyond all
@@ -88,6 +89,7 @@ def summarise(simulator: Any) -> dict:
         "terms": plan.terms,
         "com_start": simulator.start_com.tolist(),
         "com_end": simulator.com.tolist(),
+        "displacement": (simulator.com - simulator.start_com).tolist(),
         "com_max_height": statistics.com_max_height,
         "max_curvature": statistics.max_curvature,
         "mean_curvature": float(np.average(curvature, weights=model.node_length)),
@@ -98,6 +100,7 @@ def summarise(simulator: Any) -> dict:
         "contact_stiffness": model.contact_stiffness or None,
         "min_gap": min_gap if np.isfinite(min_gap) else None,
         "max_contact_force": statistics.max_contact_force,
+        "pair_forces": {" on ".join(pair): force for pair, force in simulator.pair_forces.items() if force > 0.0},
         "energy": simulator.energy(),
         "largest_energy": largest,
         "energy_through": through,

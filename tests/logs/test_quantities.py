@@ -6,6 +6,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from support import synthetic_run
+from support.sample_scenes import everything
 
 import bilayer_core
 from bilayer_core import Recorder, Simulator, compare, load_scene, read_log
@@ -232,6 +233,22 @@ def test_the_command_warns_of_an_older_name_in_one_line(bent, tmp_path, capsys):
     assert main(asked) == 0
     told = "warning: quantity 'rod/strip/laminate/position' is now 'rod/strip/position', in the rod's middle line\n"
     assert capsys.readouterr().err == told
+
+
+def test_forces_of_pairs_and_figures_of_joints_are_logged_as_they_are_seen(tmp_path):
+    simulator = Simulator(load_scene(everything()))
+    with Recorder(simulator, ["joint/*", "contact/*"], rate=1000) as recorder:
+        simulator.run(0.01, observers=[McapRecorder(tmp_path / "run.mcap", rate=1000)])
+    run, joints = read_log(tmp_path / "run.mcap"), simulator.joints
+    assert recorder.quantities.keys() == {name for name in run.quantities if name.startswith(("joint/", "contact/"))}
+    for name, quantity in recorder.quantities.items():
+        assert run[name].unit == quantity.unit
+        np.testing.assert_array_equal(run[name].values, quantity.values)
+    last = {name: quantity.values[-1] for name, quantity in recorder.quantities.items()}
+    np.testing.assert_array_equal(last["joint/knee/wrench"], joints["knee"].wrench)
+    assert (last["joint/strut/angle"], run["joint/strut/angle"].unit) == (joints["strut"].turning.value, "rad")
+    assert (last["joint/strut/travel"], run["joint/strut/travel"].unit) == (joints["strut"].sliding.value, "m")
+    assert last["contact/ball/ground/force"] == simulator.pair_forces["ball", "ground"] > 0.0
 
 
 def test_an_older_log_of_two_layers_lacks_the_rod_of_both():

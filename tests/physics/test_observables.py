@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support.fluid_energy import energy_of_fluid
-from support.sample_scenes import everything
+from support.sample_scenes import contact, everything, layer, rod, scene
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.kinematics.rotation import quaternion_from_matrix
@@ -119,7 +119,7 @@ def test_each_pair_that_touches_is_seen_once(simulator):
         expected |= {tuple(sorted(pair)) for pair in nodes.tolist()}
     for _ in range(2):
         _, seen = simulator._stepper.observe(simulator._state)
-        assert sorted(divmod(number, owners.count) for number in seen.tolist()) == sorted(expected)
+        assert sorted(divmod(number, len(owners.pair_of)) for number in seen.tolist()) == sorted(expected)
     assert len(simulator.frame().contacts) == len(expected)
 
 
@@ -131,3 +131,20 @@ def test_a_frame_keeps_what_was_seen_while_the_run_goes_on(simulator):
     simulator.frame()
     for name, values in before.items():
         np.testing.assert_array_equal(getattr(frame, name), values)
+
+
+def test_pairs_press_with_the_weight_that_they_bear():
+    """A box on a box, which bears it with its face or with its corners, and a strip across both their sides."""
+    block = {"shape": "box", "size": [0.02, 0.02, 0.01]}
+    free = {"type": "free", "mass": 0.003}
+    bodies = [{"name": "top", "surface": block, "position": [0.003, 0, 0.01605], "motion": free}]
+    table = {"name": "table", "type": "box", "size": [0.02, 0.02, 0.02], "position": [0, 0, 0]}
+    strip = rod([layer()], 0.03, 11, start=(-0.015, 0, 0.0222), name="strip")
+    content = scene([strip], bodies=bodies, obstacles=[table], gravity=[0, 0, -9.81], contact=contact())
+    simulator = Simulator(load_scene(content | {"damping": {"mass": 50.0}}))
+    simulator.run(1.0)
+    of_strip = 9.81 * simulator.model.rods.node_mass.sum()
+    assert simulator.pair_forces["top", "table"] == pytest.approx(9.81 * 0.003 + of_strip, rel=1e-6)
+    assert simulator.pair_forces["strip", "top"] == pytest.approx(of_strip, rel=1e-5)
+    assert simulator.pair_forces["strip", "table"] == 0.0
+    assert simulator.summary()["pair_forces"].keys() == {"top on table", "strip on top"}

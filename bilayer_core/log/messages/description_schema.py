@@ -39,6 +39,7 @@ def _numbers(value: Any) -> np.ndarray:
 Name = Annotated[str, Field(max_length=120, pattern=f"^{NAME}$")]
 """That of a scene, with the number of a copy."""
 PathName = Annotated[str, Field(max_length=250, pattern=f"^{NAME}(/{NAME})+$")]
+JointFigure = Annotated[str, Field(max_length=150, pattern=f"^(joint|body)/{NAME}/(wrench|angle|travel)$")]
 Number = Annotated[float, Field(strict=True, ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]
 Size = Annotated[float, Field(strict=True, ge=0.0, le=LARGEST_NUMBER)]
 Count = Annotated[int, Field(strict=True, ge=0, le=MOST_NODES)]
@@ -132,7 +133,7 @@ class JointPart(Part):
 
 
 class DescriptionPart(Part):
-    """A `Description` without the text of its scene; older logs have neither joints nor units of channels."""
+    """A `Description` without the text of its scene; joints, units, pairs and figures are not in older logs."""
 
     scene_name: Name
     title: str
@@ -149,12 +150,15 @@ class DescriptionPart(Part):
     settings: Annotated[dict[ShortText, ShortText], Field(max_length=1000)]
     joints: Annotated[tuple[JointPart, ...], Field(max_length=MOST_PARTS)] = ()
     channel_units: Annotated[tuple[Unit, ...], Field(max_length=MOST_PARTS)] | None = None
+    contact_pairs: Annotated[tuple[tuple[Name, Name], ...], Field(max_length=MOST_PARTS)] = ()
+    joint_figures: Annotated[tuple[JointFigure, ...], Field(max_length=MOST_PARTS)] = ()
 
     @model_validator(mode="after")
     def _check_references(self) -> Self:
         for key in ("strands", "bodies", "obstacles"):
             _refuse_repeated(key, (part.name for part in getattr(self, key)))
-        _refuse_repeated("channels", self.channels)
+        for key in ("channels", "contact_pairs", "joint_figures"):
+            _refuse_repeated(key, getattr(self, key))
         _refuse_repeated("state_layout", (name for name, _ in self.state_layout))
         for strand in self.strands:
             for of in (strand, *strand.layers):

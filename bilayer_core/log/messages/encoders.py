@@ -14,7 +14,7 @@ from bilayer_core.log.messages.cdr import SEPARATOR, Template, read_float64_mult
 from bilayer_core.log.messages.markers import MarkerEncoder
 from bilayer_core.log.messages.node_frames import NodeFrames
 from bilayer_core.log.messages.tf_frames import TfEncoder
-from bilayer_core.log.messages.topics import FRAME_ID, MARKERS, SECTION_POINTS, TF, output_topics
+from bilayer_core.log.messages.topics import CONTACT_PAIRS, FRAME_ID, JOINTS, MARKERS, SECTION_POINTS, TF, output_topics
 from bilayer_core.observed.frame import Description, Frame
 from bilayer_core.observed.inputs import LOAD, SIZES, STIMULUS, Input
 from bilayer_core.printable import shortened
@@ -30,6 +30,11 @@ def state_template(description: Description) -> Template:
     layout = description.state_layout
     names = (f"{name}:{'x'.join(map(str, shape))}" for name, shape in layout)
     return multi_array_template(names, sum(math.prod(shape) for _, shape in layout))
+
+
+def contact_pairs_template(description: Description) -> Template:
+    """Return the template of forces between pairs; each name is that of both, with a space between."""
+    return multi_array_template(map(" ".join, description.contact_pairs))
 
 
 def clock_template() -> Template:
@@ -154,6 +159,10 @@ class FrameEncoder:
             "solver": SmallMessage(
                 multi_array_template(SOLVER_LABELS),
                 lambda frame: [getattr(frame, name) for name in SOLVER_LABELS],
+            ),
+            CONTACT_PAIRS.name: SmallMessage(contact_pairs_template(description), lambda frame: frame.pair_forces),
+            JOINTS.name: SmallMessage(
+                multi_array_template(description.joint_labels), lambda frame: frame.joint_figures
             ),
             "state": SmallMessage(state_template(description), lambda frame: frame.state),
             "nodes": SmallMessage(pose_array_template(len(self._node_frames.order)), self._poses),

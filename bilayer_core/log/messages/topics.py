@@ -84,6 +84,7 @@ itself. They come with every frame: who looks one up by the stamp of a pose, a w
 """
 
 
+CONTACT_PAIRS, JOINTS = (TopicSpec(name, MULTI_ARRAY, Rate.OUTPUT) for name in ("contact_pairs", "joints"))
 SECTION_POINTS = TopicSpec("section_points", "sensor_msgs/msg/PointCloud2", Rate.DISPLAY)
 
 
@@ -99,6 +100,8 @@ def output_topics(description: Description, tf: bool = False) -> tuple[TopicSpec
     ``body_pose/<body>``             mass centre and orientation
     ``contact_wrench/<body>``        contact force [N] and moment about the mass centre [N m], world frame
     ``clamp_wrench/<body>``          likewise of the rods that the body holds, for bodies that hold some
+    ``contact_pairs``                sum of the normal forces between two that can touch [N]; the label has their names
+    ``joints``                       wrench, angle [rad] and way [m] of joints; the label has their names
     ``state``                        all that a restart needs; the label has ``name:shape`` of each part
     ``nodes``                        pose of every node, strand by strand; the axes x, y, z of a pose are the material
                                      frame: m1 (through the thickness), m2 (along the width), m3 (tangent)
@@ -126,6 +129,8 @@ def output_topics(description: Description, tf: bool = False) -> tuple[TopicSpec
             for body in description.bodies
             if body.holds_rods
         ),
+        *((CONTACT_PAIRS,) if description.contact_pairs else ()),
+        *((JOINTS,) if description.joint_figures else ()),
         TopicSpec("state", MULTI_ARRAY, output),
         *((TF,) if tf else ()),
         TopicSpec("nodes", "geometry_msgs/msg/PoseArray", display),

@@ -17,7 +17,7 @@ from bilayer_core.log.messages.cdr import NANOSECONDS, Template, decoded, read_f
 from bilayer_core.log.messages.event_messages import decode_event
 from bilayer_core.log.messages.events import Event
 from bilayer_core.log.messages.node_frames import node_order
-from bilayer_core.log.messages.topics import EVENTS, SECTION_POINTS, Rate, output_topics
+from bilayer_core.log.messages.topics import CONTACT_PAIRS, EVENTS, JOINTS, SECTION_POINTS, Rate, output_topics
 from bilayer_core.log.run.bag import split_address
 from bilayer_core.log.run.opened_run import MessageSource, open_run
 from bilayer_core.log.run.quantities import Entry, Quantity, entries
@@ -167,7 +167,9 @@ class LogSource:
         if name in _OF_SHAPES:
             return self._shapes()
         description, count = self.description, len(self.times[TIME])
-        self._take_memory(8 * count * len(description.bodies) * sum(_WIDTHS.values()))
+        rows = {"stimulus": len(description.channels), "com": 3, "pair_forces": len(description.contact_pairs)}
+        rows["joint_figures"] = len(description.joint_labels)
+        self._take_memory(8 * count * (len(description.bodies) * sum(_WIDTHS.values()) + sum(rows.values())))
         # Of a run that goes on, shapes may have come alone.
         wanted = [entry for entry in self.entries.values() if not entry.of_shape and entry.topic in self._topics]
         values = self._values(wanted)
@@ -175,7 +177,7 @@ class LogSource:
             attribute: np.full((count, len(description.bodies), width), np.nan) for attribute, width in _WIDTHS.items()
         }
         of["clamp_wrenches"][:, [k for k, body in enumerate(description.bodies) if not body.holds_rods]] = 0.0
-        of |= {"stimulus": np.full((count, len(description.channels)), np.nan), "com": np.full((count, 3), np.nan)}
+        of |= {name: np.full((count, width), np.nan) for name, width in rows.items()}
         of |= {"energy": {}, "solver": {}}
         for entry in wanted:
             if isinstance(of[entry.attribute], dict):
@@ -320,6 +322,10 @@ class LogSource:
             return encoders.pose_array_template(len(node_order(self.description))), "poses"
         if kind == "points":
             return encoders.point_cloud_template(self.description.node_count), "points"
+        if kind == CONTACT_PAIRS.name:
+            return encoders.contact_pairs_template(self.description), "data"
+        if kind == JOINTS.name:
+            return encoders.multi_array_template(self.description.joint_labels), "data"
         if kind == SECTION_POINTS.name:
             return encoders.point_cloud_template(self.description.node_count, encoders.SECTION_FIELDS), "points"
         return encoders.stamped_template({"com": 3, "body_pose": 7}.get(kind, 6)), "data"

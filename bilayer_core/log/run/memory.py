@@ -61,6 +61,8 @@ class MemoryRecorder:
             body_quaternions=stack("body_quaternions"),
             contact_wrenches=stack("contact_wrenches"),
             clamp_wrenches=stack("clamp_wrenches"),
+            pair_forces=stack("pair_forces"),
+            joint_figures=stack("joint_figures"),
             solver={name: stack(name) for name in SOLVER_LABELS},
             shape_times=stack("time"),
             positions=stack("positions", np.float32),

@@ -11,6 +11,11 @@ name                               axes after time                is
 ``body/<body>/quaternion``         part                           x y z w
 ``body/<body>/contact_wrench``     part                           force [N] and moment [N m] of contact
 ``body/<body>/clamp_wrench``       part                           of the rods that it holds
+``body/<body>/angle``, ``travel``                                 of a guided body that something resists [rad, m]
+``joint/<joint>/wrench``           part                           on its first body, about the joint [N, N m]
+``joint/<joint>/angle``                                           about its axis, with ``turning`` in the scene [rad]
+``joint/<joint>/travel``                                          along its axis, with ``sliding`` [m]
+``contact/<one>/<other>/force``                                   sum of the normal forces between two [N]
 ``rod/<rod>/position``             node, axis                     the rod's middle line: midway between its faces [m]
 ``rod/<rod>/contact_force``        node, axis                     [N]
 ``rod/<rod>/frame``                node, part                     quaternion x y z w of the axes m1 m2 m3
@@ -39,12 +44,13 @@ import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.log.messages.node_frames import node_order
-from bilayer_core.log.messages.topics import SECTION_POINTS
+from bilayer_core.log.messages.topics import CONTACT_PAIRS, JOINTS, SECTION_POINTS
 from bilayer_core.log.run.middle_line import LayerMiddle, RodMiddle
-from bilayer_core.observed.frame import Description, Strand
+from bilayer_core.observed.frame import WRENCH, Description, Strand
 
 Array = np.ndarray
-AXES, QUATERNION, WRENCH = ("x", "y", "z"), ("x", "y", "z", "w"), ("fx", "fy", "fz", "mx", "my", "mz")
+AXES, QUATERNION = ("x", "y", "z"), ("x", "y", "z", "w")
+JOINT_UNITS = {"angle": "rad", "travel": "m"}
 SOLVER_UNITS = {"residual": "m/s", "min_gap": "m", "cpu_time": "s"}
 
 
@@ -216,6 +222,15 @@ def entries(description: Description, terms: Iterable[str], figures: Iterable[st
         for kind in ("contact", "clamp") if body.holds_rods else ("contact",):
             topic = f"{kind}_wrench/{body.name}"
             yield Entry(f"{of}/{kind}_wrench", "N, N m", f"{kind}_wrenches", (k,), topic, (), ("part",), WRENCH)
+    for k, (one, other) in enumerate(description.contact_pairs):
+        yield Entry(f"contact/{one}/{other}/force", "N", "pair_forces", (k,), CONTACT_PAIRS.name, (k,))
+    for k, label in enumerate(description.joint_labels):
+        name, _, part = label.partition(".")
+        if not part:
+            yield Entry(name, JOINT_UNITS[name.rpartition("/")[2]], "joint_figures", (k,), JOINTS.name, (k,))
+        elif part == WRENCH[0]:
+            at = (slice(k, k + len(WRENCH)),)
+            yield Entry(name, "N, N m", "joint_figures", at, JOINTS.name, at, ("part",), WRENCH)
     row_of = {int(node): k for k, node in enumerate(node_order(description))}
     rods: dict[str, list[Strand]] = {}
     for strand in description.strands:

@@ -37,6 +37,10 @@ class RunData(Recorded):
         [m], x y z w, shapes (frames, bodies, 3 | 4).
     contact_wrenches, clamp_wrenches : ndarray
         Of contact, and of the rods that a body holds [N, N m], shape (frames, bodies, 6).
+    pair_forces : ndarray
+        Normal forces of pairs that can touch [N], shape (frames, pairs).
+    joint_figures : ndarray
+        Wrenches, angles and ways of joints [N, N m, rad, m], shape (frames, figures).
     solver : dict
         Name -> shape (frames,): iterations, residual [m/s], substeps, min_gap [m], cpu_time [s].
     shape_times : ndarray
@@ -62,6 +66,8 @@ class RunData(Recorded):
     body_quaternions: np.ndarray
     contact_wrenches: np.ndarray
     clamp_wrenches: np.ndarray
+    pair_forces: np.ndarray
+    joint_figures: np.ndarray
     solver: dict[str, np.ndarray]
     shape_times: np.ndarray
     positions: np.ndarray

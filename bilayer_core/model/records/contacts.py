@@ -63,6 +63,7 @@ class Surfaces:
     near_contact_point: Indices = ("near",)
     near_surface: Indices = ("near",)
     near_gap: Vector = ("near",)
+    near_force: Vector = ("near",)  # normal force of the barrier, with that of damping [N]
     near_node: Indices = ("near",)  # of contact points of rods, those of others themselves
     near_arm: Flags = ("near",)  # whether it is not the node itself
     near_mix: Matrix = ("near", 6)  # of its edges; see `contact.near`
@@ -160,7 +161,7 @@ class RodContactList:
     right: IndexTable = ("contact", 2)  # rails of their right borders, −1 of round rods
     weight: Matrix = ("contact", "leg")  # w_m, of right borders last
     normal: Matrix = ("contact", 3)  # n
-    normal_force: Vector = ("contact",)  # λ [N]; those of friction alone
+    normal_force: Vector = ("contact",)  # λ [N]
     turn: Stack = ("contact", 6, 4)  # of friction's place, from either middle, by the vector and turn of its edge
     matrix: Stack = ("contact", 3, 3)  # M [N/m]
     tangential_stiffness: Vector = ("contact",)  # κ [N/m]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bilayer_core.simulation.views.motion import Motion, motion_of, slots_of_owner
+from bilayer_core.simulation.views.motion import Motion, motion_of
 from bilayer_core.simulation.views.present import ByName, Present
 
 Array = np.ndarray
@@ -35,14 +35,7 @@ class JointView:
 
     @property
     def wrench(self) -> Array:
-        engine, first = self._present.evaluated().engine, 2 * self._index
-        joints = engine.joints
-        body, wrench = joints.body[first], -joints.gradient[first]
-        for index in slots_of_owner(self._present, self._name, guides=False).values():
-            wrench = wrench - engine.mechanisms.gradient[2 * index]
-        arm = self._present.state.body_rotation[body] @ joints.arm[first]
-        wrench[3:] -= np.cross(arm, wrench[:3])
-        return wrench
+        return self._present.seen().joint_wrench[self._index]
 
     @property
     def distance(self) -> float:

@@ -28,17 +28,10 @@ class Motion:
     beyond: float
 
 
-def slots_of_owner(present: Present, owner: str, guides: bool) -> dict[bool, int]:
-    """Return the slots of the mechanisms of a joint or of a guided body, by whether they slide."""
-    return {
-        mechanism.slides: index
-        for index, mechanism in enumerate(present.model.mechanisms)
-        if mechanism.owner == owner and mechanism.is_guide == guides
-    }
-
-
 def motion_of(present: Present, owner: str, slides: bool, guides: bool) -> Motion | None:
-    index = slots_of_owner(present, owner, guides).get(slides)
+    wanted = owner, guides, slides
+    slots = (k for k, of in enumerate(present.model.mechanisms) if (of.owner, of.is_guide, of.slides) == wanted)
+    index = next(slots, None)
     if index is None:
         return None
     mechanisms = present.evaluated().engine.mechanisms
