@@ -97,14 +97,14 @@ def fine(trial):
 
 
 def test_cases_that_hang_die_or_take_all_memory_fail_and_the_rest_goes_on(monkeypatch):
-    monkeypatch.setattr(pool, "LEAST_TIME", 15.0)
+    monkeypatch.setattr(pool, "LEAST_TIME", 8.0)
     content = partial(scene_of, Parameters(stations=5))
     ways = {"hangs": hangs, "memory": takes_all_memory, "dies": dies, "fine": fine}
     cases = [StressCase(name, content, decide=way, cpu_limit=0.1) for name, way in ways.items()]
     records: dict[str, Record] = {}
     run_cases(cases, 1, lambda record: records.update({record.name: record}))
     reasons = {name: record.reason for name, record in records.items()}
-    assert reasons["hangs"] == "took longer than 15 s, and was killed"
+    assert reasons["hangs"] == "took longer than 8 s, and was killed"
     assert reasons["memory"] == "out of memory"
     assert reasons["dies"] == "its process died with exit code 7"
     outcomes = {name: record.outcome for name, record in records.items()}

@@ -23,6 +23,7 @@ import numpy as np
 
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.log.file.output_paths import write_text
+from bilayer_core.model.strip_choice import section_of
 from bilayer_core.scene.bundled import bundled_scene
 from bilayer_core.scene.loader import read_scene_file
 from bilayer_core.scene.text import read_yaml
@@ -92,18 +93,22 @@ def sharp(problem: str, models: Iterable[str]) -> bool:
 
 def fingerprint(problem: Problem) -> str:
     """Return a hash of everything that a reference depends on: the scene file without its title, description and solver
-    settings, the changes, the duration and the measure. A rod that says nothing of its section is a beam.
+    settings, the changes, the duration and the measure. Rods have the section that they are computed with, which `auto`
+    may choose; a beam goes without saying.
     """
     path = bundled_scene(problem.scene)
     scene = read_yaml(read_scene_file(path), str(path))
     for key in ("title", "description", "solver"):
         scene.pop(key, None)
-    for rod in scene["rods"]:
-        if rod.get("section") == "beam":
-            del rod["section"]
+    config = problem.config()
+    for rod, computed in zip(scene["rods"], config.rods, strict=True):
+        rod.pop("section", None)
+        if (section := section_of(config, computed)) != "beam":
+            rod["section"] = section
+    changes = [change for change in problem.changes if ".section=" not in change]
     measure = {key: value for key, value in vars(problem.measure).items() if not callable(value)}
     measure.pop("stops", None)
-    content = [scene, problem.changes, problem.duration, measure]
+    content = [scene, changes, problem.duration, measure]
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()[:16]
 
 

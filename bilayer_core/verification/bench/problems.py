@@ -95,6 +95,7 @@ def halved(stations: int, dt: float, count: int) -> tuple[tuple[int, float], ...
 SNAP = (
     "stimuli.swelling.schedule={type: ramp, start: 0 s, end: 20 ms, from: 0, to: 1}",
     "rods.strip.layers.active.eigenstrain.gain=5 %",
+    "rods.strip.section=beam",  # as its reference, and the splines that check it
 )
 FAST_GRIP = (
     "stimuli.humidity.schedule={type: ramp, start: 0 s, end: 2.66 s, from: 0, to: 1}",
