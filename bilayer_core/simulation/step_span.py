@@ -10,9 +10,9 @@ integrator there is, whatever its stages were. Material directors are carried fr
 the last one by such a cubic of the edge's turn; bodies turn by a cubic of the rotation vector from the first pose.
 So frames stay orthonormal, and at both ends all is as the step left it.
 
-**Forces**, strains, curvatures, angles and ways of joints, energies and gaps go linearly from their values at one end to those at the other. They
-are never computed from interpolated places: where something rests on a barrier, a micrometre beside the right place is
-the whole force. Stimuli are those of their schedules at that time.
+**Forces**, strains, curvatures, angles and ways of joints, energies and gaps go linearly from their values at one end
+to those at the other. They are never computed from interpolated places: where something rests on a barrier, a
+micrometre beside the right place is the whole force. Stimuli are those of their schedules at that time.
 
 **Gaps** stay positive. The chord from q₀ to q₁ comes no nearer to a flat surface than its ends; the cubic may, where a
 velocity changes at once. So what touches at either end departs from its chord by at most half the smallest gap.
