@@ -257,7 +257,7 @@ def draw(lines: Sequence[Line], names: Sequence[str], width: str | float = "sing
         last.set_xlabel("time [s]")
     else:
         unit = lines[0].over_unit
-        factor, prefix = _prefix(unit, [line.times for line in lines])
+        factor, prefix = prefix_of(unit, [line.times for line in lines])
         last.set_xlabel(words_of(axis.name) + in_brackets(prefix + unit))
         for curve in (of for axes in figure.axes for of in axes.get_lines()):
             curve.set_xdata(np.asarray(curve.get_xdata()) / factor)
@@ -298,7 +298,7 @@ class _Legend:
 
 
 def _draw_panel(axes, unit: str, held: list[Line], legend: _Legend) -> None:
-    factor, prefix = _prefix(unit, [line.values for line in held])
+    factor, prefix = prefix_of(unit, [line.values for line in held])
     own = list(dict.fromkeys(line.name for line in held))
     for line, label in zip(held, legend.labels, strict=True):
         first, second = (line.run, own.index(line.name)) if len(own) == 1 else (own.index(line.name), line.run)
@@ -367,7 +367,7 @@ def _common_and_rest(names: list[str]) -> tuple[str, dict[str, str]]:
     return common[: cut - 1] + node, {name: words_of(rest).removeprefix(", ") for name, rest in rests.items()}
 
 
-def _prefix(unit: str, held: Sequence[np.ndarray]) -> tuple[float, str]:
+def prefix_of(unit: str, held: Sequence[np.ndarray]) -> tuple[float, str]:
     """Return the factor and SI prefix by which the largest of all values is at least 1."""
     if unit not in WITH_PREFIX:
         return 1.0, ""
