@@ -22,7 +22,7 @@ def summary_lines(summary: dict[str, Any], moved: set[str]) -> Iterator[str]:
     summary : dict
         As `Simulator.summary` gives it.
     moved : set of str
-        Names of the bodies whose motion is a result and not prescribed.
+        Names of the bodies that forces may lift.
     """
     factor = summary["real_time_factor"]
     yield f"{summary['scene']}: {summary['termination']}, {summary['simulated']:g} s in {summary['steps']} steps"
