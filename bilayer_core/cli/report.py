@@ -25,7 +25,7 @@ def summary_lines(summary: dict[str, Any], moved: set[str], verbose: bool) -> It
     summary : dict
         As `Simulator.summary` gives it.
     moved : set of str
-        Names of the bodies whose motion is a result and not prescribed.
+        Names of the bodies that forces may lift.
     verbose : bool
         Whether a line for each figure comes instead of the second and the third.
     """

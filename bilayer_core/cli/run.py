@@ -292,7 +292,8 @@ def _write_outputs(
 
 def _tell(simulator: Simulator, summary: dict[str, Any], options: dict[str, Any], judge: _Judge | None) -> None:
     """Print what happened."""
-    moved = {body.name for body in simulator.scene.bodies if body.motion.type != "prescribed"}
+    bodies = {body.name: body.motion for body in simulator.scene.bodies}
+    moved = {name for name, motion in bodies.items() if motion.type == "free" or getattr(motion, "axis", None)}
     for line in summary_lines(summary, moved, options["verbose"]):
         say(line)
     for key in OUTPUT_SUFFIXES:

@@ -94,7 +94,8 @@ class Engine:
             thickness=thickness,
             plate=plate,
             free=free,
-            mass=float(model.rods.node_mass.sum()),
+            mass=float(model.rods.node_mass.sum() + model.robot_mass.sum()),
+            robot_mass=model.robot_mass,
             voronoi_length=model.voronoi_length,
         )
         self.start_over(-math.inf)

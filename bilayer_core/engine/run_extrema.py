@@ -73,6 +73,8 @@ def count_end(p, state, at, work, gap, time, extrema):
     for r in range(raised.edge.shape[0]):
         moment = raised.first_moment[r, 0] + raised.first_moment[r, 1]
         height += moment * state.director1[raised.edge[r], 2]
+    for b in range(extrema.robot_mass.shape[0]):
+        height += extrema.robot_mass[b] * state.body_position[b, 2]
     extrema.height, extrema.least_gap = max(extrema.height, height / extrema.mass), min(extrema.least_gap, gap)
     extrema.contact_force = max(extrema.contact_force, math.sqrt(largest))
     extrema.put_in += abs(work.account.supplied)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from bilayer_core.kinematics.rotation import rotation_matrix
@@ -57,6 +59,26 @@ def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = Non
         bounding_radius=_bounding_radii(scene, found, shapes, free, moments),
         rotates=np.array([index in free or body.motion.turns for index, body in enumerate(scene.bodies)], dtype=bool),
     )
+
+
+def robot_bodies(scene: SceneConfig, holders: Iterable[int], apart: Iterable[int] = ()) -> list[int]:
+    """Return the bodies that hold rods, or are joined to such a body, without prescribed ones and those set `apart`."""
+    places = {body.name: index for index, body in enumerate(scene.bodies)}
+    moving = {index for index, body in enumerate(scene.bodies) if not isinstance(body.motion, Prescribed)} - {*apart}
+    robot, size = moving & {*holders}, -1
+    while size != len(robot):
+        size = len(robot)
+        for joint in scene.joints:
+            pair = {places[name] for name in joint.bodies}
+            robot |= pair & moving if pair & robot else set()
+    return sorted(robot)
+
+
+def robot_mass(scene: SceneConfig, found: Collected, bodies: Bodies) -> np.ndarray:
+    """Return the mass of each body that belongs to the robot, 0 of others [kg], shape (n_body,)."""
+    mass, own = np.zeros(len(scene.bodies)), robot_bodies(scene, found.column("attached_body", np.int64).tolist())
+    mass[own] = bodies.mass[bodies.free_index[own]]
+    return mass
 
 
 def _bounding_radii(

@@ -8,7 +8,7 @@ import numpy as np
 
 from bilayer_core.jit import UNALLOCATED
 from bilayer_core.kinematics.frame_strains import cross
-from bilayer_core.model.bodies import build_bodies
+from bilayer_core.model.bodies import build_bodies, robot_mass
 from bilayer_core.model.contact_points import build_contact
 from bilayer_core.model.field_points import build_varied_fields
 from bilayer_core.model.force_list import active_forces
@@ -107,6 +107,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         rails=rails,
         **contact,
         bodies=placed,
+        robot_mass=robot_mass(scene, found, bodies),
         contact_stiffness=0.0 if scene.contact is None else scene.contact.stiffness,
         rod_point_weight=rod_point_weight,
         node_count=found.node_count,

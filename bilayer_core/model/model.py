@@ -95,6 +95,7 @@ class Model(ReadOnlyArrays):
     rails: Rails  # absent where rods meet about their nodes
 
     bodies: PlacedBodies
+    robot_mass: Array  # of bodies that hold rods or are joined to these, 0 of others [kg], shape (n_body,)
     contact_stiffness: float  # of the barrier, `contact.stiffness` or more [Pa]; 0 without contact
     surface_names: tuple[str, ...]
     point_count: int  # of contact points of bodies, corners and rims of their surfaces among them

@@ -22,6 +22,7 @@ from typing import Protocol
 
 import numpy as np
 
+from bilayer_core.model.bodies import robot_bodies
 from bilayer_core.model.free_motions import start_rates
 from bilayer_core.model.model import Model
 from bilayer_core.scene.body import Free, Guided
@@ -64,7 +65,7 @@ def set_in_motion(model: Model, state: State) -> None:
     """Give everything in a state the velocity with which the scene starts it, where it is in the state."""
     scene, links = model.scene, links_of(model)
     own = {index: motion for index, motion in enumerate(_own_motions(scene, state)) if motion is not None}
-    robot = _robot(scene, links, own)
+    robot = robot_bodies(scene, (body for held in links.values() for body in held if body is not None), own)
     whole = _whole_motion(model, state, robot)
     motions = own | dict.fromkeys(robot, whole) if whole else _spread(scene, links, own, state)
     for body, motion in motions.items():
@@ -118,16 +119,6 @@ def _own_motions(scene: SceneConfig, state: State) -> Iterator[RigidMotion | Non
 def _given(velocity: tuple | None, angular_velocity: tuple | None, about: Array) -> RigidMotion:
     """Return a rigid motion about a point, of which a part that is not given is zero."""
     return RigidMotion(np.array(velocity or np.zeros(3)), np.array(angular_velocity or np.zeros(3)), about.copy())
-
-
-def _robot(scene: SceneConfig, links: dict[str, tuple[int | None, int | None]], own: dict) -> list[int]:
-    """Return the free bodies without a motion of their own that hold rods, or are joined to such a body."""
-    robot = {body for held in links.values() for body in held if body is not None and body not in own}
-    joints, size = joined_bodies(scene), -1
-    while size != len(robot):
-        size = len(robot)
-        robot |= {body for pair in joints if robot & set(pair) for body in pair if body not in own}
-    return sorted(robot)
 
 
 def _whole_motion(model: Model, state: State, robot: list[int]) -> RigidMotion | None:

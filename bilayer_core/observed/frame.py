@@ -243,7 +243,7 @@ class Frame:
     clamp_wrenches : ndarray
         Likewise of the rods that it holds, shape (bodies, 6).
     com : ndarray
-        Mass centre of the robot: rods and clamped bodies, free bodies left out [m], shape (3,).
+        Mass centre of the robot: rods, and bodies that hold them or are joined to these [m], shape (3,).
     stimulus : ndarray
         Value of each channel, where a step ended that which acted over it, in its unit, shape (channels,).
     energy : dict

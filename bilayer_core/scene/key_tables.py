@@ -80,8 +80,9 @@ def _tag(model: type[BaseModel]) -> tuple[str, Any] | None:
     """Return the key and value that distinguish this mapping from its alternatives."""
     for name in TAGS:
         field = model.model_fields.get(name)
-        if field is not None and get_origin(field.annotation) is Literal:
-            return name, get_args(field.annotation)[0]
+        values = get_args(field.annotation) if field is not None and get_origin(field.annotation) is Literal else ()
+        if len(values) == 1:
+            return name, values[0]
     return None
 
 

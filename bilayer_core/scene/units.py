@@ -90,6 +90,21 @@ def parse_quantity(text: str, unit: str) -> float:
         raise ValueError("too large a number") from None
 
 
+def in_si(value: float, unit: str) -> float:
+    """Return a value of a unit in SI units, and one without a unit as it is: 0.055 for 55 mm, π/4 for 45 deg.
+
+    Raises
+    ------
+    ValueError
+        If there is no such unit.
+    """
+    factor = next((units[unit] for units in USUAL_UNITS.values() if unit in units), None)
+    if factor is None:
+        found = _registry().Quantity(Decimal(repr(value)), _unit(unit)) if unit else value
+        return float(found.to_base_units().magnitude) if unit else found
+    return float(Decimal(repr(value)) * factor)
+
+
 @cache
 def _unit(text: str) -> Any:
     """Return the unit of a text such as ``m/s^2`` or ``/s``; refuse units with an offset zero or a logarithm."""

@@ -254,7 +254,7 @@ class Simulator:
 
     @property
     def com(self) -> Array:
-        """Mass centre of the rods [m], shape (3,)."""
+        """Mass centre of the robot: rods, and bodies that hold them or are joined to these [m], shape (3,)."""
         return center_of_mass(self.model, self._now)
 
     @property

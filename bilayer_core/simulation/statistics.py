@@ -20,10 +20,10 @@ CURVATURE_BY_THICKNESS = f"curvature × thickness is above {THICK_CURVATURE:g}: 
 
 
 def center_of_mass(model: Model, state: State) -> np.ndarray:
-    """Return the mass centre of the rods [m], shape (3,)."""
-    moment = model.rods.node_mass @ state.position
+    """Return the mass centre of the robot, rods and bodies that hold them or are joined to these [m], shape (3,)."""
+    moment = model.rods.node_mass @ state.position + model.robot_mass @ state.body_position
     moment += model.raised.first_moment.sum(axis=1) @ state.director1[model.raised.edge]
-    return moment / model.rods.node_mass.sum()
+    return moment / (model.rods.node_mass.sum() + model.robot_mass.sum())
 
 
 @dataclass

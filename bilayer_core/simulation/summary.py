@@ -22,6 +22,16 @@ from bilayer_core.simulation.statistics import RunStatistics
 from bilayer_core.simulation.views.body import BodyView
 from bilayer_core.simulation.views.joint import JointView
 
+UNITS = {
+    **dict.fromkeys(("com_start", "com_end", "com_max_height", "tip_positions", "min_gap", "start", "end"), "m"),
+    **dict.fromkeys(("lift", "lift_end", "distance", "displacement"), "m"),
+    **dict.fromkeys(("first_contact", "simulated", "cpu_time", "wall_time"), "s"),
+    **dict.fromkeys(("energy", "largest_energy", "energy_through", "numerical_energy", "budget"), "J"),
+    **dict.fromkeys(("max_curvature", "mean_curvature"), "1/m"),
+    **dict.fromkeys(("max_contact_force", "pair_forces"), "N"),
+    "angle": "rad",
+}
+"""By the key of a summary that stands before figures in that unit, or is one."""
 LARGE_NUMERICAL = 0.1
 """Part of the energy that went through a run that its steps may make or lose without a warning."""
 
@@ -168,8 +178,8 @@ def _of_contact(model: Model, unresolved: int, energy: float) -> Iterator[str]:
     needed = stiffness_that_holds(0.5 * heaviest(model) * square, contact.barrier_distance)
     remedy = "a larger `contact.barrier_distance`"
     if needed > model.contact_stiffness:
-        remedy = f"`contact.stiffness` {needed:.0e} Pa, or {remedy}"
-    yield f"{unresolved} steps, as short as allowed, did not resolve an impact on the barrier: {remedy}, holds it"
+        remedy = f"`contact.stiffness` {needed:.0e} Pa, or {remedy},"
+    yield f"{unresolved} steps, as short as allowed, did not resolve an impact on the barrier: {remedy} holds it"
 
 
 def _motions(view: JointView | BodyView) -> dict[str, float]:

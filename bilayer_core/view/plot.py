@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import math
 import os
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -41,6 +42,10 @@ PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
 WITH_PREFIX = ("m", "N", "J", "N m", "s", "m/s")
 KINDS = {"m": "position", "N": "force", "N m": "moment", "J": "energy", "1/m": "curvature"}
 """What a panel with several quantities shows, by its unit."""
+SYMBOLS = {"degC": "°C", "deg": "°"}
+"""Units that papers print in another way."""
+AXIS_LETTERS, MARGIN = 24, 0.03
+"""In a line beside a panel; and of an axis beyond the curves, but for time."""
 WORDS = {"com": "centre of mass", "min gap": "least gap"}
 MOST_LINES = 40
 """In one panel."""
@@ -252,10 +257,11 @@ def draw(lines: Sequence[Line], names: Sequence[str], width: str | float = "sing
         last.set_xlabel("time [s]")
     else:
         unit = lines[0].over_unit
-        factor, prefix = _prefix(unit, [line.times for line in lines])
-        last.set_xlabel(words_of(axis.name) + (f" [{prefix}{unit}]" if unit else ""))
+        factor, prefix = prefix_of(unit, [line.times for line in lines])
+        last.set_xlabel(words_of(axis.name) + in_brackets(prefix + unit))
         for curve in (of for axes in figure.axes for of in axes.get_lines()):
             curve.set_xdata(np.asarray(curve.get_xdata()) / factor)
+        last.margins(x=MARGIN)
         last.relim()
         last.autoscale()
     if axis.across is not None:
@@ -265,7 +271,7 @@ def draw(lines: Sequence[Line], names: Sequence[str], width: str | float = "sing
             raise InputError("--ylim: there are panels of several units; draw one unit, or leave it out")
         last.set_ylim(axis.upwards)
     if axis.title:
-        figure.suptitle(axis.title, fontsize=FONT_SIZE)
+        figure.suptitle(textwrap.fill(axis.title, int(inches / MILLIMETRE / LETTER)), fontsize=FONT_SIZE)
     figure.align_ylabels()
     return figure
 
@@ -280,7 +286,7 @@ class _Legend:
     @classmethod
     def of(cls, held: list[Line], names: Sequence[str], several: bool, width: float) -> _Legend:
         """Return the legend of curves, in as many columns as fit into a width [mm]."""
-        short = _without_common(list(dict.fromkeys(line.name for line in held)))
+        _, short = _common_and_rest(list(dict.fromkeys(line.name for line in held)))
         labels = [", ".join([short[line.name]] * (len(short) > 1) + [names[line.run]] * several) for line in held]
         columns = int((width - FRAME_HEIGHT) / (HANDLE + LETTER * max(map(len, labels))))
         return cls(tuple(labels), min(max(columns, 1), len(labels)))
@@ -292,7 +298,7 @@ class _Legend:
 
 
 def _draw_panel(axes, unit: str, held: list[Line], legend: _Legend) -> None:
-    factor, prefix = _prefix(unit, [line.values for line in held])
+    factor, prefix = prefix_of(unit, [line.values for line in held])
     own = list(dict.fromkeys(line.name for line in held))
     for line, label in zip(held, legend.labels, strict=True):
         first, second = (line.run, own.index(line.name)) if len(own) == 1 else (own.index(line.name), line.run)
@@ -302,8 +308,7 @@ def _draw_panel(axes, unit: str, held: list[Line], legend: _Legend) -> None:
             linestyle=DASHES[(second + first // len(COLOURS)) % len(DASHES)],
             label=label,
         )
-    shown = f" [{prefix}{unit}]" if unit else ""
-    axes.set_ylabel(f"{_label(own, unit)}{shown}")
+    axes.set_ylabel(textwrap.fill(_label(own, unit) + in_brackets(prefix + unit), AXIS_LETTERS))
     axes.margins(x=0.0)
     if legend.rows:
         axes.legend(
@@ -317,12 +322,21 @@ def _draw_panel(axes, unit: str, held: list[Line], legend: _Legend) -> None:
         )
 
 
+def in_brackets(unit: str) -> str:
+    """Return a unit as it stands behind a label: `` [mm]``, or nothing for a plain number."""
+    unit = SYMBOLS.get(unit, unit).replace(" ", "\N{NO-BREAK SPACE}")
+    return f" [{unit}]" if unit else ""
+
+
 def _label(own: list[str], unit: str) -> str:
-    """Return a label for the quantities of a panel, in one or two words."""
+    """Return a label for the quantities of a panel: what their names have in common, or else their kind."""
     if len(own) == 1:
         return words_of(own[0])
+    common, _ = _common_and_rest(own)
+    if common.endswith("wrench"):
+        common = common.removesuffix("wrench") + KINDS[unit]
     starts = {name.partition("/")[0] for name in own}
-    return KINDS.get(unit) or (starts.pop() if len(starts) == 1 else "value")
+    return words_of(common) or KINDS.get(unit) or (starts.pop() if len(starts) == 1 else "value")
 
 
 def words_of(name: str) -> str:
@@ -330,21 +344,30 @@ def words_of(name: str) -> str:
     head, comma, node = name.partition(", ")
     path, dot, component = head.rpartition(".")
     parts = (path or component).replace("_", " ").split("/")
-    if parts[0] in ("rod", "body", "stimulus"):
+    if parts[0] in ("rod", "body", "stimulus") and len(parts) > 1:
         parts = parts[1:]
     elif parts[0] == "energy":
         parts = [*parts[1:], "energy"]
     return WORDS.get(shown := " ".join(parts), shown) + (f", {component}" if dot else "") + comma + node
 
 
-def _without_common(names: list[str]) -> dict[str, str]:
-    """Return the names without the words that all begin with: ``kinetic`` of ``energy/kinetic``, ``fx`` of ``….fx``."""
+def _common_and_rest(names: list[str]) -> tuple[str, dict[str, str]]:
+    """Return what all names begin with, and each name without that, in words: ``energy`` and ``kinetic``,
+    ``body/ball/position`` and ``z``; without a common name of rod or body nothing, and ``ball position, z``.
+    """
+    if len(names) == 1:
+        return names[0], {names[0]: ""}
     common = os.path.commonprefix(names)
     cut = max(common.rfind("/"), common.rfind(".")) + 1
-    return {name: name[cut:] for name in names}
+    if common[:cut] in ("", "rod/", "body/"):
+        return "", {name: words_of(name) for name in names}
+    ends = {name.partition(", ")[2] for name in names}
+    node = f", {ends.pop()}" if len(ends) == 1 and ends != {""} else ""
+    rests = {name: name[cut:].removesuffix(node) for name in names}
+    return common[: cut - 1] + node, {name: words_of(rest).removeprefix(", ") for name, rest in rests.items()}
 
 
-def _prefix(unit: str, held: Sequence[np.ndarray]) -> tuple[float, str]:
+def prefix_of(unit: str, held: Sequence[np.ndarray]) -> tuple[float, str]:
     """Return the factor and SI prefix by which the largest of all values is at least 1."""
     if unit not in WITH_PREFIX:
         return 1.0, ""

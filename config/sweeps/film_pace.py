@@ -19,11 +19,10 @@ def change(content, parameters):
     Parameters
     ----------
     content : dict
-        In SI units.
     parameters : dict
-        `thickness` of the swelling layer [um] and `period` of the humidity [s].
+        `thickness` of the swelling layer and `period` of the humidity.
     """
-    rod, period, thickness = content["rods"][0], parameters["period"], 1e-6 * parameters["thickness"]
+    rod, period, thickness = content["rods"][0], parameters["period"], parameters["thickness"]
     passive, active = rod["layers"]
     factor = thickness / active["thickness"]
     rod["path"]["start"][2] += (factor - 1.0) * passive["thickness"]  # as far above the ground

@@ -9,8 +9,8 @@ WEIGHT = 0.027
 
 
 def change(content, parameters):
-    """Make the arms as long as `length` [mm], with stations as far apart as those of the scene."""
-    arm, length = content["rods"][0], 1e-3 * parameters["length"]
+    """Make the arms as long as `length`, with stations as far apart as those of the scene."""
+    arm, length = content["rods"][0], parameters["length"]
     arm["stations"] = 1 + round((arm["stations"] - 1) * length / arm["path"]["length"])
     arm["path"]["length"] = length
     arm["layers"][1]["interval"] = [0.0, length - BARE]

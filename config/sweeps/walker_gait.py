@@ -17,11 +17,11 @@ def change(content, parameters):
         In SI units.
     parameters : dict
         `period` [s] of the humidity; `rise`, the part of it in which humidity rises; `wettest`, its highest value;
-        `hip` [deg], how far behind the lowest point of the arc the hind leg is.
+        `hip`, how far behind the lowest point of the arc the hind leg is.
     """
     content["stimuli"]["humidity"]["schedule"] = _schedule(**{key: parameters[key] for key in KEYS})
     content["duration"] = CYCLES * parameters["period"]
-    _move_hind_leg(content, math.radians(parameters["hip"]))
+    _move_hind_leg(content, parameters["hip"])
     return content
 
 

@@ -38,6 +38,8 @@ def test_the_page_says_unit_range_default_and_alternatives():
         "| `layers` | list of [Layer](#layer) |  | **required** | 1 to 2 items |",
         "| `eigenstrain` | [Eigenstrain](#eigenstrain) or list of [Eigenstrain](#eigenstrain) |  | none |",
         "| `torsion` | choice |  | `laminate` | `laminate`, `layers` |",
+        "| `type` | choice |  | **required** | `pin`, `hinge`, `universal`, `slide`, `cylinder`, `weld` |",
+        "| `shape` | choice |  | **required** | `bow`, `random` |",
         "Stands at `bodies.NAME.motion`, with `type: guided`.",
         "Stands at `rods.NAME.pattern`, with `type: rotation`, the default.",
     ):

@@ -115,6 +115,15 @@ def test_a_rod_that_grows_sideways_bears_its_weight_at_the_wall():
     assert found["body/wall/clamp_wrench", "gravity.2"][2] == pytest.approx(weight / -9.81, rel=1e-6)
 
 
+def test_the_mass_centre_of_a_robot_goes_with_the_body_at_its_end():
+    end = {"name": "block", "position": [0.1, 0, 0], "motion": {"type": "free", "mass": 1e-4, "inertia": [1e-9] * 3}}
+    wall = {"name": "wall", "position": [0, 0, 0], "motion": {"type": "prescribed"}}
+    overrides = {"bodies": [wall, end], "rods.strip.clamp_end": "block"}
+    found = at_rest("bending", overrides, SWOLLEN).gradient("com", "swelling")["com", "swelling"]
+    (other,) = differences("bending", overrides, SWOLLEN, "swelling", 1e-3, ["com"])
+    assert error(found, other) < 1e-6
+
+
 def test_a_load_that_turns_with_the_rod_counts_in_full():
     load = {"name": "jet", "rod": "strip", "position": 0.1, "force": [0, 0, 0.02], "frame": "material"}
     overrides = HANGING | {"loads": [load]}

@@ -110,3 +110,19 @@ def test_a_thrown_robot_goes_on_without_a_shock(model, dimension):
     assert thrown.com - start == pytest.approx(0.1 * np.array(SPEED), rel=1e-12)
     energy = thrown.energy()
     assert sum(energy.values()) - energy["kinetic"] < 1e-20
+
+
+@pytest.mark.parametrize("model", ["laminate", "two_rod"])
+def test_a_thrown_robot_falls_as_its_mass_with_that_of_the_bodies_it_holds(model):
+    bodies = [body("hub", [0, 0, 0]), body("hinged", [0, 0, 0.01]), body("apart", [0, 0, 0.5])]
+    hinge = {"name": "h", "type": "hinge", "bodies": ["hub", "hinged"], "point": [0, 0, 0], "axis": [0, 1, 0]}
+    more = {"velocity": SPEED, "angular_velocity": SPIN, "gravity": [0, 0, -9.81]}
+    thrown = simulator([rod(clamp_start="hub")], bodies, model, joints=[hinge], **more)
+    start = thrown.com
+    assert start == pytest.approx([0.05 / 3, 0, 0.01 / 3], abs=1e-15)  # the rod weighs 2 g, and so does each body
+    thrown.run(0.15)
+    flown = 0.15 * np.array(SPEED) + [0, 0, -0.5 * 9.81 * 0.15**2]
+    assert thrown.com - start == pytest.approx(flown, abs=1e-6)
+    assert thrown.positions[10, 0] < thrown.positions[0, 0]  # by half a turn
+    top = start[2] + SPEED[2] ** 2 / (2.0 * 9.81)
+    assert thrown.summary()["com_max_height"] == pytest.approx(top, rel=1e-3)

@@ -6,7 +6,7 @@ from pydantic import TypeAdapter, ValidationError
 from support.processes import python
 
 from bilayer_core.scene import units
-from bilayer_core.scene.units import parse_quantity
+from bilayer_core.scene.units import in_si, parse_quantity
 
 
 @pytest.mark.parametrize(
@@ -101,11 +101,13 @@ def test_a_count_must_be_a_whole_number(value):
 )
 def test_a_usual_unit_is_converted_to_the_bits_that_the_units_library_gives(unit, written, monkeypatch):
     random = np.random.default_rng(0)
-    numbers = random.normal(size=40) * 10.0 ** random.integers(-9, 9, 40)
-    texts = [f"{number!r} {written}" for number in numbers.tolist()]
+    numbers = (random.normal(size=40) * 10.0 ** random.integers(-9, 9, 40)).tolist()
+    texts = [f"{number!r} {written}" for number in numbers]
     usual = [parse_quantity(text, unit) for text in texts]
+    assert [in_si(number, written) for number in numbers] == usual
     monkeypatch.setattr(units, "USUAL_UNITS", {})
     assert [parse_quantity(text, unit) for text in texts] == usual
+    assert [in_si(number, written) for number in numbers] == usual
 
 
 def test_scenes_in_usual_units_do_not_load_the_units_library():

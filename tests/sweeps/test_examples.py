@@ -48,7 +48,7 @@ def leaves(content, path=""):
 def changed_walker(read, **parameters):
     """Content of the walker as the sweep's function changes it."""
     content = scene_content(load_scene("crawling_dual_leg"))
-    return load(read.job.codes[read.job.change])(content, start_of(read) | parameters)
+    return load(read.job.codes[read.job.change])(content, read.job.in_si(start_of(read) | parameters))
 
 
 @pytest.mark.parametrize("name", sorted(bundled_sweeps()))

@@ -126,10 +126,18 @@ def test_a_function_may_change_the_scene_in_ways_that_no_key_path_says(strip, tm
         "    content['rods'][0]['path']['length'] = 2.0 * parameters['half']\n"
         "    return content\n"
     )
-    strip["parameters"] = {"half": {"values": [0.04, 0.05]}}
+    strip["parameters"] = {"half": {"values": ["40 mm", "50 mm"]}}
     strip["change"] = "own.py:double"
     found = rows(strip)
     assert [row.metrics["height"] for row in found] == [row.metrics["height"] for row in rows_of_lengths(strip)]
+
+
+@pytest.mark.parametrize("half", [[0.04, 0.05], ["40 mm", "5 cm"]])
+def test_functions_get_parameters_in_si_units_whatever_the_sweep_writes(strip, half):
+    strip["parameters"] = {"half": {"path": "rods.strip.path.length", "values": half}}
+    found = rows(strip, functions={"seen": lambda run: run.parameters["half"]})
+    assert [row.metrics["seen"] for row in found] == [0.04, 0.05]
+    assert [row.parameters["half"] for row in found] == ([0.04, 0.05] if half[0] == 0.04 else [40.0, 50.0])
 
 
 def rows_of_lengths(strip):

@@ -18,7 +18,7 @@ RANGES = {
     "gain": {"path": "rods.strip.layers.active.eigenstrain.gain", "from": "0.5 %", "to": "2 %", "start": "1 %"},
     "length": {"path": "rods.strip.path.length", "values": ["80 mm", "100 mm", "120 mm"]},
 }
-NEAR = {"near": lambda run: -((run.parameters["gain"] - 1.7) ** 2) - (run.parameters["length"] != 100.0)}
+NEAR = {"near": lambda run: -((100.0 * run.parameters["gain"] - 1.7) ** 2) - (run.parameters["length"] != 0.1)}
 
 
 @pytest.fixture

@@ -87,7 +87,7 @@ def test_the_legend_of_lines_stands_beside_them(tmp_path):
     points = [{"a": float(k), "b": b} for k in range(6) for b in (1.0, 2.0, 3.0)]
     image = pixels(draw(result(points, about("a", "b", metrics=["height"]), lambda a, b: b), tmp_path)[0])
     coloured = np.nonzero(image.max(axis=2) - image.min(axis=2) > 60)
-    lines = coloured[1][(coloured[0] > 0.5 * image.shape[0])]
+    lines = coloured[1][(coloured[0] > 0.8 * image.shape[0])]
     # level lines end with the field; what is coloured to the right of it is the legend
     assert coloured[1].max() > lines.max() + 20
 
@@ -107,6 +107,27 @@ def test_words_and_single_values_are_not_drawn_as_numbers(tmp_path):
 def test_the_front_of_pareto_is_what_nothing_is_better_than():
     points = np.array([[0.0, 3.0], [1.0, 2.0], [1.0, 1.0], [2.0, 2.0], [3.0, 0.0], [3.0, 0.0]])
     assert front(points).tolist() == [True, False, False, True, True, True]
+
+
+def test_axes_have_the_units_of_parameters_and_metrics_and_curves_fit_them(tmp_path, monkeypatch):
+    from matplotlib.figure import Figure
+
+    shown = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, path: shown.append(figure) or path.write_bytes(b"-"))
+    told = about("a", "b", units={"a": "mm", "height": "m", "cost": "N m"}, title="A long title. " * 9)
+    draw(result(grid(3), told, lambda a, b: 0.01 * (a + b)), tmp_path)
+    lines, coloured = shown[:2]
+    assert (lines.axes[0].get_xlabel(), lines.axes[0].get_ylabel()) == ("a [mm]", "height [mm]")
+    assert [curve.get_ydata().tolist() for curve in lines.axes[0].get_lines()] == [
+        [0, 10, 20],
+        [10, 20, 30],
+        [20, 30, 40],
+    ]
+    assert coloured.axes[1].get_ylabel() == "height [mm]" and coloured.axes[0].get_ylabel() == "b"
+    assert shown[2].axes[0].get_ylabel() == "cost [mN\xa0m]"
+    title, legend = lines._suptitle, lines.legends[0]
+    lines.canvas.draw()
+    assert title.get_window_extent().x0 > 0 and not title.get_window_extent().overlaps(legend.get_window_extent())
 
 
 def test_results_come_back_from_their_table(tmp_path):

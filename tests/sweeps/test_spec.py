@@ -41,6 +41,7 @@ GAIN = "parameters/gain"
         (f"{GAIN}/values", [1], "must be given, or `from` and `to` instead of it"),
         ("parameters/length/values", [], "must have at least one value"),
         ("parameters/length/values", ["80 mm", "3 s"], "must have units of one kind"),
+        ("parameters/length/values", ["80 mmm"], "must have a unit that is known; whose unit 'mmm' is not known"),
         (f"{GAIN}/spacing", "logarithmic", "must be 'linear' or 'log'"),
         (f"{GAIN}/from", "-1 %", None),
         ("parameters/outcome", {"path": "duration", "values": [1]}, "outcome is a column of results anyway"),

@@ -37,7 +37,12 @@ def test_quantities_of_one_unit_share_a_panel_with_that_unit(logs, closing):
     run = read_log(logs / "slow.mcap")
     figure = draw(lines_of(run, 0, ["com.z", "energy/*", "body/ball/contact_wrench"]), ["slow"])
     labels = [axes.get_ylabel() for axes in figure.axes]
-    assert labels == ["centre of mass, z [mm]", "energy [µJ]", "force [mN]", "moment [N m]"]
+    assert labels == [
+        "centre of mass, z [mm]",
+        "energy [µJ]",
+        "ball contact force [mN]",
+        "ball contact moment\n[N\xa0m]",
+    ]
     assert figure.axes[-1].get_xlabel() == "time [s]"
     (line,) = figure.axes[0].get_lines()
     np.testing.assert_allclose(line.get_ydata(), 1e3 * run.com[:, 2])
@@ -54,6 +59,44 @@ def test_a_quantity_is_drawn_over_another_one_within_limits(logs, closing):
     np.testing.assert_allclose(line.get_ydata(), 1e3 * run.com[:, 2])
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("ball position, z [mm]", "centre of mass, z [mm]")
     assert (axes.get_xlim(), axes.get_ylim(), figure.get_suptitle()) == ((20.0, 22.0), (0.0, 60.0), "One lift")
+
+
+def test_a_path_that_goes_straight_up_does_not_lie_on_the_frame(closing):
+    upright = Line(0, "com.z", "m", np.array([0.0, 0.0, 0.05]), np.array([0.0, 0.02, 0.02]), "m")
+    (axes,) = draw([upright], ["run"], axis=Axis("com.x")).axes
+    assert axes.get_xlim() == pytest.approx((-1.5, 51.5))
+
+
+@pytest.mark.parametrize(
+    ("names", "unit", "label", "told"),
+    [
+        (["body/cube/position.x", "body/cube/position.z"], "m", "cube position [m]", ["x", "z"]),
+        (
+            ["rod/arm_0/position.x, node 9", "rod/arm_0/position.z, node 9"],
+            "m",
+            "arm 0 position, node 9\n[m]",
+            ["x", "z"],
+        ),
+        (["rod/a/position.z, node 4", "rod/a/position.z, node 9"], "m", "a position [m]", ["z, node 4", "z, node 9"]),
+        (["body/a/position.z", "body/b/position.z"], "m", "position [m]", ["a position, z", "b position, z"]),
+        (["stimulus/heat", "stimulus/cold_air"], "degC", "stimulus [°C]", ["heat", "cold air"]),
+        (["rod/jaw_0/contact_force.x, node 40"], "N", "jaw 0 contact force, x,\nnode 40 [N]", None),
+    ],
+)
+def test_a_panel_says_what_its_curves_have_in_common_and_the_legend_the_rest(names, unit, label, told, closing):
+    (axes,) = draw([Line(0, name, unit, np.arange(2.0), np.ones(2)) for name in names], ["run"]).axes
+    assert axes.get_ylabel() == label
+    legend = axes.get_legend()
+    assert told == (legend and [text.get_text() for text in legend.get_texts()])
+
+
+def test_no_label_is_longer_than_its_panel(closing):
+    names = [("rod/left_fore_leg/contact_force.x, node 40", "N"), ("rod/left_fore_leg/position.x, node 40", "m")]
+    with matplotlib.rc_context(STYLE):
+        figure = draw([Line(0, name, unit, np.arange(2.0), np.ones(2)) for name, unit in names], ["run"])
+        figure.canvas.draw()
+    for axes in figure.axes:
+        assert axes.yaxis.label.get_window_extent().height < 1.1 * axes.get_window_extent().height
 
 
 @pytest.mark.parametrize(

@@ -144,13 +144,14 @@ class StageInputs:
 class RunExtrema:
     """Extrema over a run; see `simulation.statistics`."""
 
-    mass: float  # of all rods [kg]
+    mass: float  # of the robot [kg]
+    robot_mass: Vector  # of bodies that belong to it, 0 of others [kg], shape (n_body,)
     voronoi_length: Vector  # of bending elements [m], shape (n_bend,)
     faces: Matrix  # heights of both faces over the curve at bending elements [m], shape (n_bend, 2)
     thickness: Vector  # of the whole section there [m], shape (n_bend,)
     plate: Vector  # by which curvature makes 1 where a plate would be too stiff, see `model.bent_plates` [m], likewise
     free: Vector  # curvature beyond their rest that is not by loads [1/m], likewise
-    height: float = CHANGES  # greatest of the rods' mass centre [m]
+    height: float = CHANGES  # greatest of the robot's mass centre [m]
     least_gap: float = CHANGES  # [m]
     contact_force: float = CHANGES  # largest on a node [N]
     curvature: float = CHANGES  # [1/m]

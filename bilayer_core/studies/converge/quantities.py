@@ -2,7 +2,7 @@
 
 | name | what |
 | --- | --- |
-| ``com.x``, ``com.y``, ``com.z`` | displacement of the rods' mass centre over the run [m] |
+| ``com.x``, ``com.y``, ``com.z`` | displacement of the robot's mass centre over the run [m] |
 | ``com.rise``, ``com.rise_time`` | how far it rose above its start at most [m], and when [s] |
 | ``take_off`` | when nodes lost their last contact, if they end the run without any [s] |
 | ``body.<name>.x``, ``.y``, ``.z`` | displacement of a body [m] |

@@ -62,7 +62,7 @@ def scene_of(job: Job, parameters: dict[str, Any]) -> SceneConfig:
     values = {name: _written(job, name, value) for name, value in parameters.items()}
     if job.change:
         try:
-            content = load(job.codes[job.change])(content, dict(parameters))
+            content = load(job.codes[job.change])(content, job.in_si(parameters))
         except Exception as error:  # of the user's function
             raise MetricError(f"change ({job.change}): {type(error).__name__}: {error}") from error
         if not isinstance(content, dict):
@@ -132,7 +132,7 @@ def _simulate(job: Job, point: Point, row: Row, begin: float, log: Path | None) 
         summary = simulator.summary()
         row.summary = {key: value for key, value in summary.items() if key not in LEFT_OUT}
     if ended.termination is Termination.COMPLETED:
-        row.metrics = measure(job, FinishedRun(simulator, summary, dict(point.parameters), recording))
+        row.metrics = measure(job, FinishedRun(simulator, summary, job.in_si(point.parameters), recording))
     else:
         row.outcome = Outcome.OVER_TIME
         row.reason = f"took longer than {job.wall_time:g} s; it was at t = {simulator.time:g} s of the scene"

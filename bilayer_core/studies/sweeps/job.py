@@ -11,6 +11,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from bilayer_core.scene.units import in_si
 from bilayer_core.studies.sweeps.spec import Condition, Metric
 
 DIGITS = 20
@@ -111,6 +112,10 @@ class Job:
         It depends on the scene, solver settings, the function that changes the scene, parameters and version.
         """
         return digest(self._common + json.dumps(parameters, sort_keys=True, default=str))
+
+    def in_si(self, parameters: dict[str, Any]) -> dict[str, Any]:
+        """Return the parameters of a run in SI units, as scenes and figures of runs are."""
+        return {name: in_si(of, self.units[name]) if name in self.units else of for name, of in parameters.items()}
 
 
 @dataclass(frozen=True)

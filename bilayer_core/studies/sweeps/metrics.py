@@ -13,8 +13,10 @@ import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.log.run.recorded import Recorded
+from bilayer_core.log.run.tables import component_unit
 from bilayer_core.printable import shortened
 from bilayer_core.simulation.simulator import Simulator
+from bilayer_core.simulation.summary import UNITS
 from bilayer_core.studies.sweeps.job import Job
 from bilayer_core.studies.sweeps.spec import Metric, OfFunction, OfQuantity, OfSummary
 from bilayer_core.studies.sweeps.sweep_functions import load
@@ -35,7 +37,7 @@ class FinishedRun:
     summary : dict
         As of ``bilayer run --summary``.
     parameters : dict
-        Values of what is varied, by name.
+        Values of what is varied, by name; in SI units.
     recording : Recorded or None
         Quantities over time; None if the sweep records none.
     """
@@ -176,22 +178,27 @@ def series(metric: OfQuantity, recording: Recorded) -> np.ndarray:
     return values
 
 
-def check_metrics(job: Job, run: FinishedRun) -> None:
-    """Check that a run has everything that the metrics ask for, without calling functions.
+def check_metrics(job: Job, run: FinishedRun) -> dict[str, str]:
+    """Check that a run has everything that the metrics ask for, without calling functions; return their units.
 
     Raises
     ------
     InputError
         Names the metric.
     """
+    units = {}
     for name, metric in job.metrics.items():
-        if isinstance(metric, OfFunction):
-            continue
         try:
-            if isinstance(metric, OfSummary):
+            if isinstance(metric, OfFunction):
+                units[name] = metric.unit
+            elif isinstance(metric, OfSummary):
                 of_summary(metric.summary, run.summary)
+                units[name] = next((UNITS[key] for key in metric.summary.split(".") if key in UNITS), "")
             else:
                 assert run.recording is not None
                 series(metric, run.recording)
+                quantity, component = name_and_component(metric.quantity, run.recording.entries())
+                units[name] = component_unit(run.recording[quantity].unit, component)
         except InputError as error:
             raise InputError(f"metrics.{name}: {error}") from None
+    return {name: unit for name, unit in units.items() if unit}

@@ -6,6 +6,7 @@ coordinates. Two objectives give the front of Pareto. matplotlib is imported whe
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from bilayer_core.extras import require
 from bilayer_core.log.file.output_paths import draft_of
 from bilayer_core.studies.sweeps.job import Row
 from bilayer_core.studies.sweeps.sweep_result import SweepResult
-from bilayer_core.view.plot import COLOURS, MILLIMETRE, STYLE
+from bilayer_core.view.plot import COLOURS, LETTER, MILLIMETRE, STYLE, in_brackets, prefix_of
 
 WIDTH, HEIGHT = 110.0, 78.0
 """Of a picture [mm]."""
@@ -44,7 +45,7 @@ def draw(result: SweepResult, directory: Path) -> list[Path]:
             figure = Figure(figsize=(WIDTH * MILLIMETRE, HEIGHT * MILLIMETRE), layout="constrained")
             paint(figure)
             if result.about.title:
-                figure.suptitle(result.about.title, fontsize=8)
+                figure.suptitle(textwrap.fill(result.about.title, int(WIDTH / LETTER)), fontsize=8)
             path = directory / f"{name}.png"
             with draft_of(path, force=True) as draft:
                 figure.savefig(draft)
@@ -85,20 +86,31 @@ def _other(varied: list[str], numeric: list[str]) -> str:
     return next(name for name in varied if name != numeric[0])
 
 
+def _unit(result: SweepResult, name: str) -> tuple[float, str]:
+    """Return what the numbers of a column are divided by for a picture, and the unit that they then have: metrics in SI
+    units get a prefix, parameters keep the unit in which the sweep says them.
+    """
+    unit = result.about.units.get(name, "")
+    if name in result.about.parameters:
+        return 1.0, unit
+    values = [row.metrics.get(name) for row in result.rows]
+    factor, prefix = prefix_of(unit, [np.array([value for value in values if value is not None], dtype=float)])
+    return factor, prefix + unit
+
+
 def _label(result: SweepResult, name: str, value: str = "") -> str:
-    unit, shown = result.about.units.get(name, ""), name.replace("_", " ")
-    if value:
-        return f"{shown} {value} {unit}".rstrip()
-    return f"{shown} [{unit}]" if unit else shown
+    shown, (_, unit) = name.replace("_", " "), _unit(result, name)
+    return f"{shown} {value} {unit}".rstrip() if value else shown + in_brackets(unit)
 
 
 def _scale(result: SweepResult, name: str) -> str:
     return "log" if name in result.about.logarithmic else "linear"
 
 
-def _values(rows: list[Row], name: str) -> Column:
+def _values(result: SweepResult, rows: list[Row], name: str) -> Column:
+    """Return a column of some rows, in the unit of its label."""
     found = [row.parameters.get(name, row.metrics.get(name)) for row in rows]
-    return np.array([np.nan if value is None else float(value) for value in found])
+    return np.array([np.nan if value is None else float(value) for value in found]) / _unit(result, name)[0]
 
 
 def _lines(
@@ -109,16 +121,16 @@ def _lines(
     for row in done:
         groups.setdefault(str(row.parameters[_other(varied, numeric)]) if len(varied) == 2 else "", []).append(row)
     for k, (value, rows) in enumerate(groups.items()):
-        x, y = _values(rows, along), _values(rows, metric)
+        x, y = _values(result, rows, along), _values(result, rows, metric)
         order = np.argsort(x, kind="stable")
         told = f"{_label(result, _other(varied, numeric), _short(value))}" if value else None
         axes.plot(x[order], y[order], "o-", markersize=2.5, color=COLOURS[k % len(COLOURS)], label=told)
     lost = [row for row in result.rows if row.outcome.value != "done"]
-    for x in _values(lost, along):
-        axes.axvline(x, color=MISSING, linewidth=0.5, zorder=0)
+    for k, x in enumerate(_values(result, lost, along)):
+        axes.axvline(x, color=MISSING, linewidth=0.5, zorder=0, label=None if k else "no result")
     axes.set(xlabel=_label(result, along), ylabel=_label(result, metric), xscale=_scale(result, along))
-    if len(groups) > 1:
-        figure.legend(loc="outside right upper")
+    if len(groups) > 1 or lost:
+        figure.legend(loc="outside right center")
 
 
 def _short(value: str) -> str:
@@ -130,7 +142,7 @@ def _short(value: str) -> str:
 
 def _map(figure: Any, result: SweepResult, names: list[str], metric: str) -> None:
     axes, rows = figure.subplots(), list(result.rows)
-    x, y, z = (_values(rows, name) for name in (*names, metric))
+    x, y, z = (_values(result, rows, name) for name in (*names, metric))
     levels = np.unique(x), np.unique(y)
     if len(levels[0]) * len(levels[1]) == len({*zip(x.tolist(), y.tolist(), strict=True)}):
         grid = np.full((len(levels[1]), len(levels[0])), np.nan)
@@ -143,7 +155,9 @@ def _map(figure: Any, result: SweepResult, names: list[str], metric: str) -> Non
         drawn = axes.scatter(x[known], y[known], c=z[known], cmap=MAP, s=14)
     lost = ~np.isfinite(z)
     if lost.any():
-        axes.scatter(x[lost], y[lost], marker="x", s=14, linewidths=0.7, color="#666666", label=f"no {metric}")
+        axes.scatter(
+            x[lost], y[lost], marker="x", s=14, linewidths=0.7, color="#666666", label=f"no {metric.replace('_', ' ')}"
+        )
         axes.legend(loc="upper left", bbox_to_anchor=(0.0, 1.1))
     axes.set(xlabel=_label(result, names[0]), ylabel=_label(result, names[1]))
     axes.set(xscale=_scale(result, names[0]), yscale=_scale(result, names[1]))
@@ -178,7 +192,7 @@ def _parallel(figure: Any, result: SweepResult, done: list[Row], numeric: list[s
     axes = figure.subplots()
     by = next(iter(result.about.objectives), measured[0])
     names = [*numeric, *(name for name in measured if name != by), by]
-    table = np.array([_values(done, name) for name in names])
+    table = np.array([_values(result, done, name) for name in names])
     table = table[:, np.isfinite(table).all(axis=0)]
     if not table.size:
         return
@@ -223,7 +237,7 @@ def front(points: np.ndarray) -> np.ndarray:
 
 def _pareto(figure: Any, result: SweepResult, done: list[Row], wanted: list[str]) -> None:
     axes, (first, second) = figure.subplots(), wanted[:2]
-    x, y = _values(done, first), _values(done, second)
+    x, y = _values(result, done, first), _values(result, done, second)
     known = np.isfinite(x) & np.isfinite(y)
     x, y = x[known], y[known]
     signs = [1.0 if result.about.objectives[name] == "maximise" else -1.0 for name in (first, second)]

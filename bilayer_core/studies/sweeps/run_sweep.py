@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -41,12 +41,15 @@ class Sweep:
         What begins messages about it.
     content : dict
         That of its file, and what it depends on beside that, by which changes are noticed.
+    units : dict
+        Of metrics that have one.
     """
 
     spec: SweepSpec
     job: Job
     source: str
     content: dict[str, Any]
+    units: dict[str, str] = field(default_factory=dict)
 
     def points(self) -> Iterator[Point]:
         """Yield all runs of the sweep."""
@@ -62,7 +65,8 @@ class Sweep:
         """Description of the columns of the sweep's results."""
         job, spec = self.job, self.spec
         logarithmic = tuple(name for name, parameter in spec.parameters.items() if parameter.spacing == "log")
-        return Columns(tuple(job.paths), tuple(job.metrics), job.units, dict(spec.objectives), logarithmic, spec.title)
+        units = job.units | self.units
+        return Columns(tuple(job.paths), tuple(job.metrics), units, dict(spec.objectives), logarithmic, spec.title)
 
     def result(self, journal: Journal) -> SweepResult:
         """Return the sweep's rows in a journal; those of other versions are left out."""
@@ -191,7 +195,7 @@ def _check_metrics(sweep: Sweep, simulator: Simulator, values: Values) -> None:
     recording = None
     try:
         recording = recording_of(sweep.job, simulator)
-        check_metrics(sweep.job, FinishedRun(simulator, simulator.summary(), values, recording))
+        sweep.units.update(check_metrics(sweep.job, FinishedRun(simulator, simulator.summary(), values, recording)))
     except BilayerError as error:
         raise InputError(f"{sweep.source}: {error}") from None
     finally:

@@ -17,7 +17,7 @@ from bilayer_core.scene.faults import Fault, one_of, refuse, tell
 from bilayer_core.scene.limits import LARGEST_FILE, read_text
 from bilayer_core.scene.part import Name, Part
 from bilayer_core.scene.text import read_yaml
-from bilayer_core.scene.units import PlainNumber, PositiveRate, PositiveTime, parse_quantity, real
+from bilayer_core.scene.units import PlainNumber, PositiveRate, PositiveTime, in_si, parse_quantity, real
 from bilayer_core.scene.units import whole as count_from
 
 MOST_RUNS = 1_000_000
@@ -122,6 +122,12 @@ class Parameter(Part):
         ranged = self.from_ is not None or self.to is not None
         if (self.values is None) != ranged:
             return [(("values",), self.values, "must be given, or `from` and `to` instead of it")]
+        try:
+            in_si(1.0, self.unit)
+        except ValueError as error:
+            return [
+                (("values" if self.from_ is None else "from",), self.unit, f"must have a unit that is known; {error}")
+            ]
         if self.values is not None:
             try:
                 return [] if self.levels else [(("values",), [], "must have at least one value")]
@@ -178,6 +184,8 @@ class OfFunction(Part):
     """Metric that a Python function computes of a run, which it gets as a `FinishedRun`."""
 
     function: Function
+    unit: str = Field("", max_length=40)
+    """Of what it returns, for pictures: ``N``."""
 
 
 def _read_metric(value: Any) -> Any:

@@ -35,7 +35,7 @@ class Columns:
     parameters, metrics : tuple of str
         Names.
     units : dict
-        Of parameters that have one.
+        Of parameters and metrics that have one; metrics are in SI units.
     objectives : dict
         ``maximise`` or ``minimise``, of metrics.
     logarithmic : tuple of str
