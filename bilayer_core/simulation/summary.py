@@ -103,7 +103,7 @@ def summarise(simulator: Any) -> dict:
         "com_max_height": statistics.com_max_height,
         "max_curvature": statistics.max_curvature,
         "mean_curvature": float(np.average(curvature, weights=model.node_length)),
-        "tip_positions": {s.name: positions[s.last_node].tolist() for s in model.strands},
+        "tip_positions": {name: rod.middle_line[-1].tolist() for name, rod in simulator.rods.items()},
         "max_strain": statistics.max_strain,
         "max_fibre_strain": statistics.max_fibre_strain,
         "max_curvature_by_thickness": statistics.max_curvature_by_thickness,

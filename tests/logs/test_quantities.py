@@ -205,6 +205,7 @@ def test_a_rod_has_the_same_rows_under_the_same_names_in_both_models(both):
         middle = simulator.rods["strip"].middle_line
         assert middle.shape == curve.shape == (41, 3)
         np.testing.assert_allclose(run["rod/strip/position"].values[-1], middle, atol=1e-8)
+        assert simulator.summary()["tip_positions"] == {"strip": middle[-1].tolist()}
     assert np.abs(of_one["rod/strip/position"].values[-1] - curve).max() > 1e-4  # where nodes are does not matter
 
 
