@@ -9,7 +9,7 @@
 | ``body.<name>.first_contact`` | when a node first touched it [s] |
 | ``mean_curvature`` | mean size of the curvature through the thickness at the end [1/m] |
 | ``max_curvature`` | its largest size in the run [1/m] |
-| ``tip.<rod>/<layer>.x``, ``.y``, ``.z`` | displacement of the last node of a layer [m] |
+| ``tip.<rod>.x``, ``.y``, ``.z`` | displacement of the end of a rod's middle line [m] |
 """
 
 from __future__ import annotations
@@ -37,8 +37,7 @@ class Watch:
     """
 
     def __init__(self, simulator: Simulator):
-        self._simulator, self._tips = simulator, _tips(simulator)
-        self._com, self._tip_start = simulator.com, simulator.positions[list(self._tips.values())]
+        self._simulator, self._com, self._tips = simulator, simulator.com, _tips(simulator)
         self._times, self._heights = [simulator.time], [self._com[2]]
         self._touched, self._take_off = False, None
 
@@ -53,8 +52,7 @@ class Watch:
 
     def figures(self) -> dict[str, float]:
         """Return every quantity that the run has."""
-        simulator, tips = self._simulator, self._tips
-        summary = simulator.summary()
+        simulator, summary = self._simulator, self._simulator.summary()
         found = _by_axis("com", simulator.com - self._com)
         rise, when = peak(np.array(self._times), np.array(self._heights))
         if rise > 0.0:
@@ -66,8 +64,8 @@ class Watch:
             if body["first_contact"] is not None:
                 found[f"body.{name}.first_contact"] = body["first_contact"]
         found |= {key: summary[key] for key in ("mean_curvature", "max_curvature")}
-        for name, moved in zip(tips, simulator.positions[list(tips.values())] - self._tip_start, strict=True):
-            found |= _by_axis(f"tip.{name}", moved)
+        for name, tip in _tips(simulator).items():
+            found |= _by_axis(f"tip.{name}", tip - self._tips[name])
         return found
 
 
@@ -112,7 +110,7 @@ def check_names(simulator: Simulator, asked: Sequence[str]) -> None:
         Names the quantity, and lists those that there are.
     """
     bodies = simulator.model.bodies.names
-    points = ["com", *(f"body.{body}" for body in bodies), *(f"tip.{tip}" for tip in _tips(simulator))]
+    points = ["com", *(f"body.{body}" for body in bodies), *(f"tip.{rod}" for rod in simulator.rods)]
     known = [f"{point}.{axis}" for point in points for axis in AXES]
     known += ["com.rise", "com.rise_time", "take_off", "mean_curvature", "max_curvature"]
     known += [f"body.{body}.first_contact" for body in bodies]
@@ -136,8 +134,8 @@ def _by_axis(name: str, vector: np.ndarray) -> dict[str, float]:
     return {f"{name}.{axis}": float(value) for axis, value in zip(AXES, vector, strict=True)}
 
 
-def _tips(simulator: Simulator) -> dict[str, int]:
-    return {s.name: s.last_node for s in simulator.model.strands}
+def _tips(simulator: Simulator) -> dict[str, np.ndarray]:
+    return {name: rod.middle_line[-1] for name, rod in simulator.rods.items()}
 
 
 def peak(times: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
