@@ -107,14 +107,14 @@ def test_functions_see_simulator_summary_parameters_and_what_was_recorded(strip)
 
 def test_metrics_of_quantities_take_what_they_say(strip):
     of = "rod/strip/position.z"
-    for take in ("first", "last", "min", "max", "mean", "range", "largest_magnitude"):
+    for take in ("first", "last", "change", "min", "max", "mean", "range", "largest_magnitude"):
         strip["metrics"][take] = {"quantity": of, "node": -1, "take": take}
     strip["metrics"]["late"] = {"quantity": of, "node": -1, "take": "range", "after": "0.3 s"}
     strip["record"] = {"quantities": ["rod/strip/position"], "rate": 100}
     kept = []
     row = rows(strip, functions={"keep": lambda run: kept.append(run.recording[of[:-2]].values[:, -1, 2])})[0]
     z, found = kept[0], row.metrics
-    assert found["first"] == z[0] and found["last"] == z[-1] and found["late"] == 0.0
+    assert (found["first"], found["last"], found["change"]) == (z[0], z[-1], z[-1] - z[0]) and found["late"] == 0.0
     assert found["min"] == z.min() and found["max"] == z.max() and found["range"] == pytest.approx(z.max() - z.min())
     assert found["mean"] == pytest.approx(z.mean()) and found["largest_magnitude"] == abs(z).max() > 0.0
 

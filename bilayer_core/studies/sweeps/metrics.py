@@ -143,6 +143,8 @@ def _of_quantity(metric: OfQuantity, recording: Recorded | None) -> float | None
         return float(np.abs(chosen).max())
     if metric.take == "range":
         return float(np.ptp(chosen))
+    if metric.take == "change":
+        return float(chosen[-1] - chosen[0])
     if metric.take in ("first", "last"):
         return float(chosen[0 if metric.take == "first" else -1])
     found = float(getattr(chosen, metric.take)())  # min, max or mean

@@ -172,8 +172,8 @@ class OfQuantity(Part):
 
     quantity: str
     """As ``bilayer plot`` has it: ``com.z``, ``body/ball/contact_wrench.fz``."""
-    take: Literal["first", "last", "min", "max", "mean", "range", "largest_magnitude"]
-    """Which number."""
+    take: Literal["first", "last", "change", "min", "max", "mean", "range", "largest_magnitude"]
+    """Which number; `change` is the last less the first, such as how far a robot went."""
     node: int | None = None
     """Of a quantity of nodes, which one: 0 is the first, -1 the last."""
     after: Annotated[float, *real("a time", "s", "0.5 s", at_least=0.0)] = 0.0
