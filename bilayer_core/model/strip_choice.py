@@ -92,8 +92,8 @@ def refusal(scene: SceneConfig, rod: Rod) -> str:
     if len({scene.materials[layer.material].retardation_time for layer in rod.layers}) > 1:
         return "needs layers with one retardation_time, since one curve relaxes at one rate"
     for layer in rod.layers:
-        if layer.width is not None:
-            return f"needs layers of one width, since a plate is one thickness across, and {layer.name} has a `width`"
+        if rod.width_of(layer) != rod.width_of(rod.layers[0]):
+            return "needs layers of one `width`, since a plate has one thickness across it"
         if layer.natural_twist != rod.layers[0].natural_twist:
             return "needs layers with one `natural_twist`: the borders of unlike ones are unlike in length"
     return ""
