@@ -165,8 +165,8 @@ def _add_strip_joints(
 
 def _wound(rod: Rod, shape: StrandShape) -> Array:
     """Return by how much the layers of a strip, all alike, would twist it at nodes [rad], shape (n_copy, n_node)."""
-    nodes = rod.edge_length * np.arange(shape.voronoi.shape[-1])
-    return values_at(rod.layers[0].natural_twist, nodes) * shape.voronoi
+    places = rod.edge_length * rod.on_path(np.arange(shape.voronoi.shape[-1]))
+    return values_at(rod.layers[0].natural_twist, places) * shape.voronoi
 
 
 def _strands(
