@@ -70,7 +70,7 @@ from __future__ import annotations
 
 import math
 
-from bilayer_core.forces.elements import acts_viscously
+from bilayer_core.forces.elements import acts_viscously, multiple_of_joint
 from bilayer_core.forces.flattening import strip_law, viscous_coupling
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.called import flat, stack_matrix
@@ -442,7 +442,13 @@ def _add_bending(strips: bool) -> Piece:
                     if strip < flattening.joint.shape[0] and flattening.joint[strip] == k:
                         if flattens:
                             energy, f1, f3, k11, k13, k33, _, _ = strip_law(
-                                flattening, stage.rest_joint, strip, k, kappa1, psi
+                                flattening,
+                                stage.rest_joint,
+                                strip,
+                                k,
+                                kappa1,
+                                psi,
+                                multiple_of_joint(p, stage, k, 0),
                             )
                             flattened, g1, g3 = flattened + energy, g1 + f1, g3 + f3
                             k1, k3, moments[6, i] = k1 + k11, k3 + k33, k13

@@ -28,7 +28,7 @@ and ψ = τ Δl, with x = √Λ κ₁ and φ = (1 − g)/x², there is
 N is a polynomial and φ is analytic, φ(0; β) = 1/180, so that nothing is special at κ = 0, where τ²/κ is infinite. θ₀
 belongs to a strip that is twisted at the start: its middle surface has the metric of that shape. Ẽ, D₂₂ and κ̄x are
 those of the section about its own neutral axis. Where the curve is off it, a joint's κ̄₁ is that at the strain 0 of the
-curve (`model.laminate_section`), and κ̄y Δl has a₁ (κ̄x Δl − κ̄₁) with it.
+curve (`model.laminate_section`): then κ̄y Δl has a₁ (κ̄x Δl − κ̄₁) with it, and k₁₃ couples twist with κ₁ − κ̄x Δl.
 
 φ is the quotient of two entire series (`model.plate_strip.flattening_series`) up to |x| = 32, from where on g is used.
 """
@@ -37,6 +37,7 @@ from __future__ import annotations
 
 import math
 
+from bilayer_core.forces.elements import multiple_of_joint
 from bilayer_core.jit import kernel, piece, record
 from bilayer_core.jit.record import Indices, Matrix, Vector
 from bilayer_core.kinematics.vector import angle, dot, row
@@ -104,18 +105,19 @@ def flatness(series, i, offset, x):
 
 
 @kernel
-def strip_law(flattening, rest, i, k, kappa, psi):
-    """Return F of strip joint i, which is joint k [J], at the strains without stress `rest` (`Stage.rest_joint`), its
-    derivatives by κ₁ and ψ, ∂²F/∂κ₁², ∂²F/∂κ₁∂ψ, ∂²F/∂ψ², and the first and second derivative by κ̄y Δl.
+def strip_law(flattening, rest, i, k, kappa, psi, multiple):
+    """Return F of strip joint i, which is joint k [J], at the strains without stress `rest` (`Stage.rest_joint`) and a
+    multiple of its moduli, its derivatives by κ₁ and ψ, ∂²F/∂κ₁², ∂²F/∂κ₁∂ψ, ∂²F/∂ψ², and the first and second
+    derivative by κ̄y Δl.
     """
-    s, curl, skew = flattening.stiffness[i], flattening.curl[i], flattening.skew[i]
-    root, coupling = flattening.scale[i], flattening.coupling[i]
+    s, curl, skew = multiple * flattening.stiffness[i], flattening.curl[i], flattening.skew[i]
+    root, coupling = flattening.scale[i], multiple * flattening.coupling[i]
     natural = rest[flattening.first + i, 0] + curl * rest[k, 0] + skew * rest[k, 2] - skew * psi
     n = kappa * (natural - curl * kappa) - psi * psi + flattening.start[i]
     n1, n3 = natural - 2.0 * curl * kappa, -skew * kappa - 2.0 * psi
     phi, first, second = flatness(flattening.series, i, flattening.offset[i], root * kappa)
     first, second = root * first, root * root * second  # by κ₁
-    d1, d3, sn = kappa - rest[k, 0], psi - rest[k, 2], s * n
+    d1, d3, sn = kappa - rest[k, 0] - rest[flattening.first + i, 1], psi - rest[k, 2], s * n
     return (
         coupling * d1 * d3 + 0.5 * sn * n * phi,
         coupling * d3 + sn * (n1 * phi + 0.5 * n * first),
@@ -136,7 +138,31 @@ def viscous_coupling(p, stage, i):
     k = p.flattening.joint[i]
     lag = p.viscosity.joint_time[k, 0] / stage.length * p.flattening.coupling[i]
     first = p.strands.edge_count + 3 * k
-    return lag, stage.origin_strain[first], stage.origin_strain[first + 2]
+    kappa, psi = stage.origin_strain[first], stage.origin_strain[first + 2]
+    if lag != 0.0 and p.off_axis.exists:
+        kappa += _bent_by_strains_of_origin(p, stage, k)
+    return lag, kappa, psi
+
+
+@kernel
+def _bent_by_strains_of_origin(p, stage, k):
+    """Return Σ b ε of joint k at the strains' origin, which are without it [rad]."""
+    joint, slope, strands = p.off_axis.joint, p.off_axis.slope, p.strands
+    low, high = 0, joint.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if joint[middle] < k:
+            low = middle + 1
+        else:
+            high = middle
+    bend = 0.0
+    if low < joint.shape[0] and joint[low] == k:
+        a, b = strands.joint_a[k], strands.joint_b[k]
+        if slope[low, 0] != 0.0:  # a clamp edge has none
+            bend += slope[low, 0] * strands.rest_length[a] * stage.origin_strain[a]
+        if slope[low, 1] != 0.0:
+            bend += slope[low, 1] * strands.rest_length[b] * stage.origin_strain[b]
+    return bend
 
 
 @record
@@ -153,11 +179,11 @@ class Sections:
 
 @piece(int, Flattening, Sections)
 def write_sections(flattening, of):
-    """Write the law for those who look at sections between steps."""
+    """Write the law, for the multiple 1 of moduli, for those who look at sections between steps."""
     for i in range(of.kappa.shape[0]):
         strip = of.strip[i]
         _, _, _, k11, k13, k33, pull, _ = strip_law(
-            flattening, of.rest, strip, flattening.joint[strip], of.kappa[i], of.psi[i]
+            flattening, of.rest, strip, flattening.joint[strip], of.kappa[i], of.psi[i], 1.0
         )
         of.pull[i] = pull
         of.tangent[i, 0], of.tangent[i, 1], of.tangent[i, 2] = k11, k13, k33
@@ -172,7 +198,9 @@ def pull_of_rest(p, at, stage):
     strands, flattening, rest = p.strands, p.flattening, stage.rest_joint
     stiffness, pull_out, stretches = strands.joint_stiffness, flattening.pull, p.off_axis.exists
     for i in range(flattening.joint.shape[0]):
-        k, coupling = flattening.joint[i], flattening.coupling[i]
+        k = flattening.joint[i]
+        multiple = multiple_of_joint(p, stage, k, 0)
+        coupling, k1, k3 = multiple * flattening.coupling[i], multiple * stiffness[k, 0], multiple * stiffness[k, 2]
         ka, kb = strands.joint_a[k], strands.joint_b[k]
         a, b, m1a, m1b = row(at.tangent, ka), row(at.tangent, kb), row(at.director1, ka), row(at.director1, kb)
         ic, p1, q1 = 1.0 / (1.0 + dot(a, b)), dot(b, m1a), dot(a, m1b)
@@ -182,10 +210,12 @@ def pull_of_rest(p, at, stage):
             psi = angle(dot(m1a, m1b) - p1 * q1 * ic, dot(m2a, m1b) - dot(b, m2a) * q1 * ic)
             psi += TWO_PI * math.floor((at.joint_strain[k, 2] - psi) / TWO_PI + 0.5)
         d1, d3 = kappa - (p.off_axis.rest[k, 0] if stretches else rest[k, 0]), psi - rest[k, 2]
-        _, _, _, _, _, _, pull, slope = strip_law(flattening, rest, i, k, kappa, psi)
-        pull_out[flattening.first + i, 0] = pull
-        pull_out[k, 0] = flattening.curl[i] * pull - coupling * d3 - stiffness[k, 0] * d1
-        pull_out[k, 2] = flattening.skew[i] * pull - coupling * d1 - stiffness[k, 2] * d3
+        _, _, _, _, _, _, pull, slope = strip_law(flattening, rest, i, k, kappa, psi, multiple)
+        j = flattening.first + i
+        pull_out[j, 0], pull_out[j, 1] = pull, -coupling * d3
+        pull_out[k, 0] = flattening.curl[i] * pull - coupling * d3 - k1 * d1
+        d1 = kappa - rest[k, 0] - rest[j, 1]
+        pull_out[k, 2] = flattening.skew[i] * pull - coupling * d1 - k3 * d3
         flattening.slope[i] = slope
 
 
@@ -197,6 +227,6 @@ def pull_of_change(p, change):
         k, j, coupling = flattening.joint[i], flattening.first + i, flattening.coupling[i]
         d1, d3, curl, skew = change[k, 0], change[k, 2], flattening.curl[i], flattening.skew[i]
         pull = flattening.slope[i] * (change[j, 0] + curl * d1 + skew * d3)
-        flattening.pull[j, 0] = pull
+        flattening.pull[j, 0], flattening.pull[j, 1] = pull, coupling * d3
         flattening.pull[k, 0] = curl * pull + coupling * d3 + stiffness[k, 0] * d1
-        flattening.pull[k, 2] = skew * pull + coupling * d1 + stiffness[k, 2] * d3
+        flattening.pull[k, 2] = skew * pull + coupling * (d1 + change[j, 1]) + stiffness[k, 2] * d3

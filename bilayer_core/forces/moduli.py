@@ -3,7 +3,7 @@
 A layer whose moduli are m times those of its material has m EA, m EI and m GJ, so each of its elements has one multiple
 m = 1 + c, c the value of its law (`stiffness_change`). Rows of `Stage.rest_joint` after those of joints hold them:
 a law gives c as another gives an eigenstrain, so both are evaluated, carried and logged in the same way, and a change
-of m is work of the stimulus, ∂V/∂m = ½ k (s − s̄)².
+of m is work of the stimulus, ∂V/∂m = ½ k (s − s̄)². So it is with F of strips (`forces.flattening`).
 
 Of a bond (`forces.bond`), translation, bending and twist only hold two layers together, and stay. Its tilt is the
 torsional stiffness that bonding adds, GJ_lam − ΣGJ_r. Two thin layers have 4 w c² g₁g₂/(g₁ + g₂) of it, g = G h, so the
@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from bilayer_core.forces.bend_twist import bend_by_strains
 from bilayer_core.forces.elements import multiple_of_edge, strains_of_joint, strains_of_pair
+from bilayer_core.forces.flattening import strip_law
 from bilayer_core.jit import kernel
 
 
@@ -47,6 +48,11 @@ def pull_of_moduli(p, at, stage):
         for c in range(3):
             rest = off_axis.rest[k, 0] if c == 0 and off_axis.exists else stage.rest_joint[k, c]
             pull[moduli.joint[k]] += 0.5 * strands.joint_stiffness[k, c] * (strains[c] - rest) ** 2
+    for i in range(p.flattening.joint.shape[0]):
+        k = p.flattening.joint[i]
+        kappa, _, psi = strains_of_joint(strands, at, k)
+        energy, _, _, _, _, _, _, _ = strip_law(p.flattening, stage.rest_joint, i, k, kappa, psi, 1.0)
+        pull[moduli.joint[k]] += energy
     for k in range(bonds.joint.shape[0]):
         strains = strains_of_pair(strands, bonds, at, k)
         for c in range(3):

@@ -28,7 +28,7 @@ from __future__ import annotations
 import math
 
 from bilayer_core.forces.bend_twist import bend_by_strains
-from bilayer_core.forces.elements import acts_viscously
+from bilayer_core.forces.elements import acts_viscously, multiple_of_joint
 from bilayer_core.forces.flattening import strip_law
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.kernel import Kernel
@@ -105,7 +105,9 @@ def _planar_bend(strips: bool) -> Kernel:
             if strips:
                 k11 = 0.0
                 if flattens and strip < flattening.joint.shape[0] and flattening.joint[strip] == k:
-                    energy, f1, _, k11, _, _, _, _ = strip_law(flattening, stage.rest_joint, strip, k, kappa, 0.0)
+                    energy, f1, _, k11, _, _, _, _ = strip_law(
+                        flattening, stage.rest_joint, strip, k, kappa, 0.0, multiple_of_joint(p, stage, k, 0)
+                    )
                     strip, flattened, force = strip + 1, flattened + energy, force + f1
             moment = force * slope
             gradient[a, 1] -= moment

@@ -75,7 +75,8 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
     raised, number, kept_directors = build_raised(found, edges_of_loads(scene, found), scene.fluid is not None)
     flow, fluid = build_fluid(scene.fluid, found, rods.edge_node, raised, number)
     loads, followers, moments = build_loads(scene, found, placed.names, bodies.free_index, number)
-    strain_coupling = found.column("strain_coupling", width=2)
+    coupled = np.argsort(found.column("coupled_joint", np.int64))
+    strain_coupling = found.column("strain_coupling", width=2)[coupled]
     built = Model(
         scene=scene,
         forces=forces,
@@ -171,10 +172,12 @@ def _drives(found: Collected) -> Drives:
     weights = [weight for _, weight, *_ in found.laws]
     numbers = np.array([own[2:] for own in found.laws], dtype=float).reshape(-1, 3).T.copy()
     rest, strips = _of_joints(found, "joint_rest", width=3), found.column("strip_joint", np.int64)
-    curled = len(rest) + np.searchsorted(strips, found.column("curled_joint", np.int64))
+    curled, freed = (
+        len(rest) + np.searchsorted(strips, found.column(f"{of}_joint", np.int64)) for of in ("curled", "freed")
+    )
     driven, twisted = (found.column(f"{name}_joint", np.int64) for name in ("driven", "twisted"))
     curled_at_rest = np.zeros((len(strips), 3))
-    curled_at_rest[:, 0] = found.column("strip_rest")
+    curled_at_rest[:, 0], curled_at_rest[:, 1] = found.column("strip_rest"), found.column("strip_free")
     multiples = np.zeros((len(found.moduli) + 1 if found.moduli else 0, 3))
     multiples[:, 0] = 1.0
     changed = len(rest) + len(strips) + np.arange(len(found.moduli))
@@ -184,8 +187,8 @@ def _drives(found: Collected) -> Drives:
         driven_edge=found.column("driven_edge", np.int64),
         driven_law=found.column("driven_law", np.int64),
         driven_weight=found.column("driven_weight"),
-        driven_joint=np.concatenate([driven, curled, twisted, changed]),
-        driven_joint_column=np.repeat([0, 0, 2, 0], [len(driven), len(curled), len(twisted), len(changed)]),
+        driven_joint=np.concatenate([driven, curled, freed, twisted, changed]),
+        driven_joint_column=np.repeat([0, 0, 1, 2, 0], [*map(len, (driven, curled, freed, twisted, changed))]),
         driven_joint_law=np.concatenate([_of_driven(found, "law", np.int64), np.array(found.moduli, dtype=np.int64)]),
         driven_joint_weight=np.append(_of_driven(found, "weight"), np.ones(len(found.moduli))),
         field_channel=np.array([channel for channel, *_ in found.fields], dtype=np.int64),
@@ -201,8 +204,10 @@ def _drives(found: Collected) -> Drives:
 
 
 def _of_driven(found: Collected, name: str, dtype: type = float) -> np.ndarray:
-    """Return a column of κ̄₁, of κ̄y Δl and of ψ̄ that follow laws."""
-    return np.concatenate([found.column(f"{of}_{name}", dtype) for of in ("driven_joint", "curled", "twisted")])
+    """Return a column of κ̄₁, of κ̄y Δl, of κ̄x Δl − κ̄₁ and of ψ̄ that follow laws."""
+    return np.concatenate(
+        [found.column(f"{of}_{name}", dtype) for of in ("driven_joint", "curled", "freed", "twisted")]
+    )
 
 
 def _flattening(found: Collected, rods: Strands) -> Flattening:
@@ -263,7 +268,7 @@ def _bonds(found: Collected, bend_count: int) -> Bonds:
 
 
 def _off_axis(found: Collected, rods: Strands, coupling: np.ndarray) -> OffAxis:
-    joint = found.column("coupled_joint", np.int64)
+    joint = np.sort(found.column("coupled_joint", np.int64))
     lengths = np.concatenate([rods.rest_length, np.ones(found.clamp_count)])
     slope = coupling / lengths[np.stack([rods.joint_a, rods.joint_b], axis=1)[joint]]
     return OffAxis.zeros(UNALLOCATED, joint=joint, slope=slope)

@@ -16,6 +16,7 @@ from bilayer_core.model.laminate_section import (
     cells_of,
     driven_cells,
     layer_cells,
+    plate_cells,
     side,
 )
 from bilayer_core.model.lit_elements import add_lit_elements, is_light
@@ -87,8 +88,8 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
         layer_cells(scene, rod, slot, axis, shape, layer.length / shape.lengths, cells)
         for slot, layer in enumerate(layers)
     ]
-    plate = plate_of(scene, rod)
-    whole = WholeSection(scene, rod, parts, cells, shape, plate)
+    plate = None if plate_of(scene, rod) is None else plate_cells(scene, rod, cells)
+    whole = WholeSection(scene, rod, parts, cells, shape, axis, plate)
     low, high = _faces(rod, axis)
     strip = section_of(scene, rod) == "strip"
     strands = _strands(found, copies, axis, shape, (low, high), strip)
@@ -120,7 +121,7 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
     found.path_height += [path] * len(copies)
     joints = add_strands(found, scene, rod, strands, shape, elements, body_index)
     if strip:
-        _add_strip_joints(found, scene.materials[rod.layers[0].material].poisson_ratio, plate, whole, joints, shape)
+        _add_strip_joints(found, rod, plate, whole, joints, shape)
     coupling = whole.strain_coupling()
     coupled = coupling.any(axis=-1) & (joints >= 0)
     found.add(coupled_joint=joints[coupled], strain_coupling=coupling[coupled])
@@ -130,7 +131,7 @@ def _add_copies(found: Collected, scene: SceneConfig, copies: list[RodCopy], bod
 
 def _add_strip_joints(
     found: Collected,
-    poisson: float,
+    rod: Rod,
     plate: PlateSection | None,
     whole: WholeSection,
     joints: Array,
@@ -144,20 +145,28 @@ def _add_strip_joints(
         return np.broadcast_to(values, joints.shape)[there][order]
 
     membrane, bending = whole.plates()
-    constants = {"curl": poisson, "plate": bending / (1.0 - poisson**2), "membrane": membrane, "offset": 0.0}
+    constants = {"curl": whole.curl, "plate": bending / (1.0 - whole.curl**2), "membrane": membrane, "offset": 0.0}
     turned = {"skew": 0.0, "coupling": 0.0}  # of the opposite sign in a mirror image
     if plate is not None:
-        (along, both, _), (curl, skew) = plate.narrow, plate.across
-        constants |= {"curl": curl, "plate": plate.plate / along, "offset": plate.offset}
-        turned = {"skew": 2.0 * skew, "coupling": both / along}
+        (along, both, _), skew = plate.narrow, plate.across[1]
+        stiffer, coupled = whole.mean_at_nodes(plate.plate / along), whole.mean_at_nodes(both / along)
+        constants |= {"plate": bending * stiffer, "offset": whole.mean_at_nodes(plate.offset)}
+        turned = {"skew": 2.0 * whole.mean_at_nodes(skew), "coupling": bending * coupled}
     handedness = np.reshape(shape.handedness, (-1, 1))
     found.add(
         strip_joint=of_joints(joints),
-        strip_start=of_joints(shape.strains()[..., 2]),
+        strip_start=of_joints(shape.strains()[..., 2] + handedness * _wound(rod, shape)),
         strip_rest=of_joints(whole.curl_rest),
+        strip_free=of_joints(whole.free_rest),
         **{f"strip_{name}": of_joints(np.array(value)) for name, value in constants.items()},
         **{f"strip_{name}": of_joints(value * handedness) for name, value in turned.items()},
     )
+
+
+def _wound(rod: Rod, shape: StrandShape) -> Array:
+    """Return by how much the layers of a strip, all alike, would twist it at nodes [rad], shape (n_copy, n_node)."""
+    places = rod.edge_length * rod.on_path(np.arange(shape.voronoi.shape[-1]))
+    return values_at(rod.layers[0].natural_twist, places) * shape.voronoi
 
 
 def _strands(
@@ -199,10 +208,17 @@ def _placed(scene: SceneConfig, rod: Rod) -> list[_Placed]:
 
 
 def _axis_of(scene: SceneConfig, rod: Rod) -> float:
-    plate = plate_of(scene, rod)
-    if plate is not None:
-        return plate.axis
-    return scene.keep("axis", (rod,), lambda: _axis(_placed(scene, rod)))
+    """Return the height of the curve over the path [m]."""
+
+    def made() -> float:
+        if plate_of(scene, rod) is None:
+            return _axis(_placed(scene, rod))
+        present = np.array([layer.present >= 0.5 for layer in _placed(scene, rod)])
+        middles = rod.edge_length * rod.on_path(np.arange(present.shape[1]) + 0.5)
+        heights = PlateSection(scene, rod, middles, present.astype(float)).axis
+        return float(heights[_prevailing(present)].mean())
+
+    return scene.keep("axis", (rod,), made)
 
 
 def _layers_in_place(scene: SceneConfig, rod: Rod) -> list[_Placed]:
@@ -390,10 +406,10 @@ def _add_eigenstrain(
         parts = whole.driven(which[0], np.stack([laws_on[k][-1] for k in alike])[:, None], which[1])
         strains |= dict(zip(alike, zip(*parts, strict=True), strict=True))
     for k, (number, _, _, driven, _) in enumerate(laws_on):
-        weight, bend, curl, twist = strains[k]
+        weight, bend, curl, free, twist = strains[k]
         weight = weight[:, driven]
         of_edges.append((first_edge + driven, np.full(weight.shape, number), weight))
-        for name, turn in (("curled", curl), ("twisted", twist)) if strip else ():
+        for name, turn in (("curled", curl), ("freed", free), ("twisted", twist)) if strip else ():
             turned = (turn != 0.0) & (joints >= 0)
             laws_of = np.full(turned.sum(), number)
             found.add(**{f"{name}_joint": joints[turned], f"{name}_law": laws_of, f"{name}_weight": turn[turned]})

@@ -47,7 +47,7 @@ from typing import Any
 
 import numpy as np
 
-from bilayer_core.model.plate_section import PlateSection, free_strain
+from bilayer_core.model.plate_section import Natural, PlateSection, free_strain
 from bilayer_core.model.section import bond, sections
 from bilayer_core.model.strands import StrandShape
 from bilayer_core.model.unknown_order import ReadOnlyArrays
@@ -153,9 +153,9 @@ class LayerCells:
     bend: Array  # EI₁/λ [N m²]
     across: Array  # EI₂/λ
     twist: Array  # GJ_l/λ
-    twist_moment: Array  # GJ_l τ̄_l [N m]
-    natural_moment: Array  # M̄ [N m]
-    across_moment: Array  # likewise across the width
+    natural_twist: Array  # λ τ̄_l [1/m]
+    curvature: Array  # λ χ̄ − χ₀ [1/m]
+    curvature_across: Array  # likewise across the width
     height: Array  # z [m]
 
 
@@ -172,13 +172,13 @@ def layer_cells(
     twist = present * section.twisting_stiffness
     handedness = np.asarray(shape.handedness)[:, None]
 
-    def moment(stiffness: Array, curvature: Any, axis: int, sign: Array | float) -> Array:
+    def beyond_path(curvature: Any, axis: int, sign: Array | float) -> Array:
         """Return what the layer's own curvature adds to that of the path."""
         if curvature is None:
-            return np.zeros_like(stiffness)
+            return np.zeros_like(bend)
         start = (shape.strains() - shape.imperfection)[..., axis] / shape.voronoi
         natural = sign * ratio * means_between(curvature, begin, end)
-        return stiffness * (natural - start[..., (cells.half + 1) // 2])
+        return natural - start[..., (cells.half + 1) // 2]
 
     return LayerCells(
         ratio=ratio,
@@ -187,9 +187,9 @@ def layer_cells(
         bend=bend,
         across=across,
         twist=twist / ratio,
-        twist_moment=handedness * twist * means_between(layer.natural_twist, begin, end),
-        natural_moment=moment(bend, layer.natural_curvature, 0, 1.0),
-        across_moment=moment(across, layer.natural_curvature_across, 1, handedness),
+        natural_twist=handedness * ratio * means_between(layer.natural_twist, begin, end),
+        curvature=beyond_path(layer.natural_curvature, 0, 1.0),
+        curvature_across=beyond_path(layer.natural_curvature_across, 1, handedness),
         height=side(rod, slot) * section.thickness - axis,
     )
 
@@ -209,6 +209,12 @@ def _bond_twist(scene: SceneConfig, rod: Rod, layers: list[LayerCells], cells: C
     return bonded * stiffness / (0.5 * (layers[0].ratio + layers[1].ratio))
 
 
+def plate_cells(scene: SceneConfig, rod: Rod, cells: Cells) -> PlateSection:
+    """Return the sections of a laminated plate in the cells of a rod."""
+    present = np.array([driven_cells(rod, cells, layer) for layer in rod.layers], dtype=float)
+    return PlateSection(scene, rod, rod.edge_length * rod.on_path(cells.middle), present)
+
+
 class WholeSection:
     """All layers together: elements of a strand without its stimuli, and what these need.
 
@@ -219,7 +225,9 @@ class WholeSection:
     joint_stiffness, joint_rest : Array
         [N m] and κ̄₁ κ̄₂ ψ̄ [rad] at all nodes, shape (n_copy, n_node, 3).
     curl_rest : Array
-        ν (κ̄x Δl − κ̄₁) of strips [rad], see `driven`, shape (n_copy, n_node).
+        κ̄y Δl and a₁ (κ̄x Δl − κ̄₁) of strips [rad], see `driven`, shape (n_copy, n_node).
+    free_rest : Array
+        κ̄x Δl − κ̄₁ [rad], likewise.
     """
 
     def __init__(
@@ -229,23 +237,37 @@ class WholeSection:
         layers: list[LayerCells],
         cells: Cells,
         shape: StrandShape,
+        axis: float,
         plate: PlateSection | None,
     ):
         self._rod, self._layers, self._plate, self._handedness = rod, layers, plate, shape.handedness
         self._cells, self._half_length = cells, 0.5 * shape.lengths[..., None]
-        self._poisson = scene.materials[rod.layers[0].material].poisson_ratio  # that of all layers of a strip
-        stretch = sum(layer.stretch for layer in layers)
-        coupling = sum(layer.stretch * layer.height for layer in layers)
-        bending = sum(layer.bend + layer.stretch * layer.height**2 for layer in layers)
+        growth, height = (1.0, 1.0, 1.0), 0.0
+        if plate is not None:  # of its axis over the curve
+            growth, height = plate.growth, plate.axis - axis
+        stretch = growth[0] * sum(layer.stretch for layer in layers)
+        bending = growth[1] * sum(layer.bend + layer.stretch * (layer.height - height) ** 2 for layer in layers)
+        coupling = stretch * height if plate is not None else sum(layer.stretch * layer.height for layer in layers)
+        bending = bending + stretch * height**2
         coupling = np.where(np.abs(coupling) <= ON_AXIS * np.sqrt(stretch * bending), 0.0, coupling)
-        growth = (1.0, 1.0, 1.0) if plate is None else plate.growth
-        if plate is not None:  # whose curve is where it does not couple
-            stretch, coupling, bending = growth[0] * stretch, 0.0 * coupling, growth[1] * bending
         self._of_cells = stretch, coupling, bending
         self._of_halves = self._in_series(stretch, coupling, bending)
         stretch, coupling, bending = self._of_halves
-        moment = self._loads(0.0 * sum(layer.bend for layer in layers), sum(layer.natural_moment for layer in layers))
         twist = growth[2] * (sum(layer.twist for layer in layers) + _bond_twist(scene, rod, layers, cells))
+        if plate is None:
+            self.curl = scene.materials[rod.layers[0].material].poisson_ratio  # ν of all layers of a strip
+            held = 0.0 * sum(layer.bend for layer in layers), sum(layer.bend * layer.curvature for layer in layers)
+            curled, turned = 0.0, sum(layer.twist * layer.natural_twist for layer in layers) / twist
+        else:
+            self.curl = self.mean_at_nodes(plate.across[0])
+            natural = [
+                plate.bent_by(slot, layer.curvature, np.reshape(shape.handedness, (-1, 1)) * layer.natural_twist)
+                for slot, layer in enumerate(layers)
+            ]
+            held = tuple(map(sum, zip(*map(self._held, natural), strict=True)))
+            curled = self.to_nodes(cells.means(sum(own.across for own in natural)))
+            turned = np.reshape(shape.handedness, (-1, 1)) * sum(own.twist for own in natural)
+        moment = self._loads(*held)
 
         self.axial_stiffness = np.mean(stretch - coupling**2 / bending, axis=-1)
         self.rest_strain = self._rest_strains(*moment) / self.axial_stiffness
@@ -253,11 +275,13 @@ class WholeSection:
         flexibility = [1.0 / bending, cells.means(1.0 / across), cells.means(1.0 / twist)]
         self.joint_stiffness = 1.0 / np.stack([self.to_nodes(part) for part in flexibility], axis=-1)
         self.joint_rest = shape.strains()
-        turned = self.to_nodes(moment[1] / bending)
-        self.joint_rest[..., 0] += turned
-        self.curl_rest = self._poisson * (self._bend_freely(*moment) - turned)
-        self.joint_rest[..., 1] += self.to_nodes(cells.means(sum(layer.across_moment for layer in layers) / across))
-        self.joint_rest[..., 2] += self.to_nodes(cells.means(sum(layer.twist_moment for layer in layers) / twist))
+        bent = self.to_nodes(moment[1] / bending)
+        self.joint_rest[..., 0] += bent
+        self.free_rest = self._bend_freely(*moment) - bent
+        self.curl_rest = curled + self.curl * self.free_rest
+        edgewise = sum(layer.across * layer.curvature_across for layer in layers) / across
+        self.joint_rest[..., 1] += self.to_nodes(cells.means(edgewise))
+        self.joint_rest[..., 2] += self.to_nodes(cells.means(turned))
 
     def _in_series(self, stretch: Array, coupling: Array, bending: Array) -> tuple[Array, Array, Array]:
         """Return A, B and D of halves from those of their cells, shapes (n_copy, n_edge, 2)."""
@@ -289,6 +313,11 @@ class WholeSection:
         """Return the integrals at nodes of what halves have per length, shape (n_copy, n_node)."""
         return _at_nodes(self._half_length * per_length)
 
+    def mean_at_nodes(self, values: Array) -> Array:
+        """Return the means at nodes of values in cells, shape (n_copy, n_node)."""
+        halves = self._cells.means(values)
+        return self.to_nodes(halves) / self.to_nodes(np.ones_like(halves))
+
     def strain_coupling(self) -> Array:
         """Return b of the edges before and after each node [rad], shape (n_copy, n_node, 2)."""
         _, coupling, bending = self._of_halves
@@ -310,12 +339,20 @@ class WholeSection:
         that at the curve's length [rad].
         """
         stretch, coupling, bending = self._of_halves
-        return self.to_nodes((coupling * force + stretch * moment) / (stretch * bending - coupling**2))
+        free = (coupling * force + stretch * moment) / (stretch * bending - coupling**2)
+        return self.to_nodes(np.where(coupling == 0.0, moment / bending, free))
 
-    def driven(self, slot: int, driven: Array, by_gradient: bool = False) -> tuple[Array, Array, Array, Array]:
+    def _held(self, natural: Natural) -> tuple[Array, Array]:
+        """Return what cells of a plate would bear at the strains of the start [N, N m], shapes (n_copy, n_cell)."""
+        stretch, coupling, bending = self._of_cells
+        force = stretch * natural.strain
+        return force, (bending - coupling**2 / stretch) * natural.along - coupling * natural.strain
+
+    def driven(self, slot: int, driven: Array, by_gradient: bool = False) -> tuple[Array, Array, Array, Array, Array]:
         """Return what an eigenstrain 1 of a layer gives, by parts in cells, shape (n_cell,): rest strains N*/A* of all
-        edges, shape (n_copy, n_edge), and of all nodes κ̄₁ (−Σ ℓ M/D in a beam), κ̄y Δl and ψ̄ [rad], shape (n_copy,
-        n_node). κ̄y Δl has ν (κ̄x Δl − κ̄₁) with it, κ̄x of a strip without force: F takes κ̄₁ for κ̄x, see `plates`.
+        edges, shape (n_copy, n_edge), and of all nodes κ̄₁ (−Σ ℓ M/D in a beam), κ̄y Δl, κ̄x Δl − κ̄₁ and ψ̄ [rad], shape
+        (n_copy, n_node). κ̄y Δl has a₁ (κ̄x Δl − κ̄₁) with it, κ̄x of a strip without force: F takes κ̄₁ for κ̄x, see
+        `plates`.
 
         By its gradient, the eigenstrain grows by 1 through the layer and is 0 on average: alone that would bend to
         −1/h, so M = −EI₁/h.
@@ -323,11 +360,11 @@ class WholeSection:
         layer = self._layers[slot]
         if self._plate is not None:
             driven, natural = driven * layer.ratio, self._plate.natural(slot, by_gradient)
-            stretch, _, bending = self._of_cells
-            strain, bend, _ = self._driven_by(driven * stretch * natural.strain, driven * bending * natural.along)
-            length = self.to_nodes(self._cells.means(driven))
-            twist = np.reshape(self._handedness, (-1, 1)) * length * natural.twist
-            return strain, bend, length * natural.across, twist
+            force, moment = self._held(natural)
+            strain, bend, free = self._driven_by(driven * force, driven * moment)
+            curl = self.to_nodes(self._cells.means(driven * natural.across)) + self.curl * (free - bend)
+            twist = self.to_nodes(self._cells.means(driven * natural.twist))
+            return strain, bend, curl, free - bend, np.reshape(self._handedness, (-1, 1)) * twist
         if by_gradient:
             moment = -driven * layer.ratio * layer.bend / self._rod.layers[slot].thickness
             strain, bend, free = self._driven_by(0.0 * moment, moment)
@@ -335,8 +372,8 @@ class WholeSection:
             axial = driven * layer.axial * np.ones_like(layer.ratio)
             strain, bend, free = self._driven_by(axial, -axial * layer.height)
         along, across, _ = free_strain(self._rod.layers[slot])
-        curl = across * free + self._poisson * along * (free - bend)
-        return along * strain, along * bend, curl, 0.0 * bend
+        curl = across * free + self.curl * along * (free - bend)
+        return along * strain, along * bend, curl, 0.0 * bend, 0.0 * bend
 
     def _driven_by(self, force: Array, moment: Array) -> tuple[Array, Array, Array]:
         """Return rest strains of edges, and κ̄₁ and κ̄x Δl of nodes, from what layers would bear in cells at rest [N,

@@ -13,7 +13,6 @@ from bilayer_core.model.plate_section import PlateSection, is_plate, plate_secti
 from bilayer_core.model.plate_strip import StripLaw, folding_ratio
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.diffusion_modes import strains_at
-from bilayer_core.scene.profile import Profile
 from bilayer_core.scene.rod import Rod
 
 MOST = 0.01
@@ -22,7 +21,6 @@ PLATE = 0.05
 """Likewise above which a beam is told to be wrong."""
 THIN = 2.0
 """Width over thickness from which on layers of unlike Poisson's ratios hold each other across, as plates do."""
-PLATES = "of fibres or of unlike poisson_ratio"
 HELD = 0.2
 """Part of a strip within one width from its clamps that counts."""
 
@@ -61,7 +59,7 @@ def _swells_to(scene: SceneConfig, rod: Rod, plate: PlateSection) -> tuple[float
         for law in layer.eigenstrain:
             channel = scene.stimuli[law.stimulus]
             strain = max(strains_at(rod, layer, law, np.array([channel.minimum, channel.maximum])).ravel(), key=abs)
-            found += strain * natural.along, strain * natural.twist, abs(strain * natural.across)
+            found += strain * natural.along[0], strain * natural.twist[0], abs(strain * natural.across[0])
     return tuple(found.tolist())
 
 
@@ -76,7 +74,7 @@ def departure(scene: SceneConfig, rod: Rod, at_edges: EdgeFigures) -> Departure:
         swells[:] = False
     change, swollen, stiffer, curl = 0.0, 0.0, 1.0, 1.0
     if is_plate(scene, rod) and (at_edges.width > THIN * at_edges.thickness).any():
-        _, stiffer, _, curl = plate_section(scene, rod).growth
+        stiffer, curl = (float(plate_section(scene, rod).growth[part][0]) for part in (1, 3))
     if swells.any():
         ratios = curl * ratio[swells]
         changes = curl * law.curvature(ratios) - 1.0
@@ -92,23 +90,12 @@ def refusal(scene: SceneConfig, rod: Rod) -> str:
     if rod.radius is not None:
         return "needs a rectangular section, and it is round"
     if len({scene.materials[layer.material].retardation_time for layer in rod.layers}) > 1:
-        return "needs layers with one retardation_time"
+        return "needs layers with one retardation_time, since one curve relaxes at one rate"
     for layer in rod.layers:
-        if layer.width is not None:
-            return f"needs layers of one width, that of the rod, and {layer.name} has a `width`"
-        if layer.stiffness_change is not None:
-            return f"needs layers whose moduli stay, and {layer.name} has a `stiffness_change`"
-        if layer.natural_twist != 0.0:
-            return f"takes its twist from its path, and {layer.name} has a `natural_twist`"
-        if not is_plate(scene, rod):
-            continue
-        if layer.natural_curvature is not None:
-            return f"{PLATES} takes no `natural_curvature`, and {layer.name} has one"
-        if layer.interval is not None:
-            return f"{PLATES} needs layers that cover all of it, and {layer.name} has an `interval`"
-        for key in ("thickness", "stiffness"):
-            if isinstance(getattr(layer, key), Profile):
-                return f"{PLATES} needs one {key} all along it, and that of {layer.name} is a profile"
+        if rod.width_of(layer) != rod.width_of(rod.layers[0]):
+            return "needs layers of one `width`, since a plate has one thickness across it"
+        if layer.natural_twist != rod.layers[0].natural_twist:
+            return "needs layers with one `natural_twist`: the borders of unlike ones are unlike in length"
     return ""
 
 
@@ -200,7 +187,7 @@ def _of_fibres(
 ) -> Iterator[Figure]:
     """Yield to what layers with fibres bend and twist a narrow strip, and what part of its stiffness is left out."""
     bend, twist, _ = _swells_to(scene, rod, plate)
-    held = rod.clamp_start and rod.clamp_end
+    held, pulled = rod.clamp_start and rod.clamp_end, abs(float(plate.pulled[0]))
     size = bend**2 + twist**2
     if size > 0.0:
         ratio = float((at_edges.width**2 / at_edges.thickness).max()) * size**0.5
@@ -215,10 +202,10 @@ def _of_fibres(
     yield Figure(
         where,
         "a pull along it would twist it as well, which is left out:",
-        f"{100 * abs(plate.pulled):.2g} % of the mean of both stiffnesses",
+        f"{100 * pulled:.2g} % of the mean of both stiffnesses",
         f"at most {100 * PLATE:g} %, or an end that is free",
-        abs(plate.pulled) / PLATE,
-        "curvature and twist are those without a pull" if held and abs(plate.pulled) > PLATE else "",
+        pulled / PLATE,
+        "curvature and twist are those without a pull" if held and pulled > PLATE else "",
     )
 
 

@@ -204,7 +204,8 @@ class Solver(Part):
     newton_tolerance: PositiveSpeed | None = None
     """Newton's last correction of velocities is at most this, and in proportion less in steps of more than 20 ms; by
     default the speed that makes 1/100 of `tolerance` (1e-4 with fixed steps) in a step of 20 ms, or as long as
-    `duration` if that is shorter."""
+    `duration` if that is shorter, and at most a tenth of `contact.friction.speed_threshold` (or 1/100 of that speed, if
+    this is more)."""
     max_newton_iterations: Annotated[int, *whole(1, 10_000)] = 50
     """After which a step counts as failed and is shortened."""
     max_halvings: Annotated[int, *whole(0, 1000)] | None = None

@@ -105,7 +105,7 @@ class Layer(Part):
     fibres: Fibres | None = None
     """Fibres at an angle to the path, in a rod with `section: strip`: what swells then bends and twists it."""
     natural_twist: varying(Twist) = 0.0
-    """Of the layer by itself, about the path, beside the twist of the path."""
+    """Of the layer by itself, about the path, beside the twist of the path; that of all layers of a strip."""
 
     def driven_by(self, channels: dict[str, str], gain: float) -> Layer:
         """Return this layer with other channels in its laws and with its gains multiplied by `gain`.

@@ -24,7 +24,7 @@ from bilayer_core.model.records.status import (
 from bilayer_core.scene.config import DEFAULT_TOLERANCE, LARGEST_TOLERANCE, Solver
 from bilayer_core.simulation.collapse import damp_materials
 from bilayer_core.simulation.crossing_remedy import more_stations
-from bilayer_core.simulation.step_choice import Steps
+from bilayer_core.simulation.step_choice import Steps, usual_newton_tolerance
 
 NEARLY = 1e3
 """Times Newton's tolerance: a last correction that is no larger may well be good enough."""
@@ -95,8 +95,9 @@ def remedy(
             return _set("solver.tolerance", f"{needed:.1g}")
         return Remedy("let what acts on the robot grow over a time instead of at once")
     friction = scene.friction
-    if friction is not None and friction.speed_threshold < MUCH_FASTER * steps.newton_tolerance:
-        needed = rounded_up(MUCH_FASTER * steps.newton_tolerance)
+    needed = MUCH_FASTER * max(steps.newton_tolerance, usual_newton_tolerance(scene, steps.tolerance))
+    if friction is not None and friction.speed_threshold < needed:
+        needed = rounded_up(needed)
         return _set("contact.friction.speed_threshold", f"{needed:.1g}", "m/s")
     if stuck and solver.newton_tolerance is not None:
         return _without("solver.newton_tolerance")

@@ -30,9 +30,9 @@ from bilayer_core.simulation.strip_sections import FOLDS, folds
 
 STEPS_AT_ONCE = 64
 """That the engine makes before anyone is asked whether to go on."""
-STEPS_TO_LOOK, PART_TO_LOOK = 128, 1.0 / 32.0
-"""Between two looks at strips, each of which costs one or two steps: so many steps at most, and so much of the duration
-of the scene, as steps in which a strip jumps from a long rest are few."""
+STEPS_TO_LOOK, PART_TO_LOOK = 128, 1.0 / 8.0
+"""Between two looks at strips, each of which costs 1 ms, as much as ten steps: so many steps at most, and so much of
+the duration of the scene, as steps in which a strip jumps from a long rest are few."""
 NO_FOLD = "a slower stimulus, less of it, or a strip that is less wide does not fold; `section: beam` never does"
 
 
@@ -227,7 +227,7 @@ class RunLoop:
     def _look_at_strips(self, steps: int, last: bool = False) -> None:
         """Look for strips that have folded, after so many more steps."""
         self._since_look += steps
-        if not last and self._since_look < STEPS_TO_LOOK and self._time < self._strips_due:
+        if not last and self._since_look < STEPS_TO_LOOK and self._stepper.reach(self._state) < self._strips_due:
             return
         self._since_look, self._looked = 0, self._time
         with self.timed():

@@ -93,7 +93,9 @@ def choose_steps(scene: SceneConfig, method: Method, dt: float | None = None, to
     longest = _longest(scene.duration) if solver.max_step is None else solver.max_step
     newton = solver.newton_tolerance
     if newton is None:
-        newton = NEWTON_PART * (tolerance or DEFAULT_TOLERANCE) * length / min(scene.duration, LONG_STEP)
+        newton = usual = usual_newton_tolerance(scene, tolerance)
+        if scene.friction is not None:
+            newton = min(usual, max(RUBBING_PART * scene.friction.speed_threshold, FINEST_PART * usual))
     dt, halvings = dt or DEFAULT_DT, solver.max_halvings
     first = dt if tolerance is None else min(dt, longest)
     shortest, least_travel = first / 2 ** (DEFAULT_HALVINGS if halvings is None else halvings), math.inf
@@ -101,6 +103,12 @@ def choose_steps(scene: SceneConfig, method: Method, dt: float | None = None, to
         shortest = min(shortest, SHORTEST_PART * _time_of_sound(scene))
         least_travel = SHORTEST_PART * tolerance * length
     return Steps(dt, tolerance, longest, shortest, least_travel, newton, reason)
+
+
+def usual_newton_tolerance(scene: SceneConfig, tolerance: float | None) -> float:
+    """Return what Newton's last correction may come to where nothing rubs [m/s]."""
+    length = max(rod.path.length for rod in scene.rods)
+    return NEWTON_PART * (tolerance or DEFAULT_TOLERANCE) * length / min(scene.duration, LONG_STEP)
 
 
 def _longest(duration: float) -> float:
@@ -144,4 +152,11 @@ The correction is taken, so what is left is less by another factor: below `engin
 the matrix is an old one, by the correction itself where it is new. The scales are the scene's own, so u fits
 robots of a micrometre, which move in microseconds, as it fits one of a kilometre; for a rod of 50 mm it is
 2.5e-6 m/s. Where this is less than positions can express, the last digit of a position counts (`engine.newton`).
+"""
+RUBBING_PART, FINEST_PART = 0.1, 0.01
+"""Likewise as a part of friction's speed threshold, down to a part of the usual one.
+
+What rests on friction moves at less than the threshold, by which alone friction balances what pushes it. With half of
+it, and ten times that for the correction after contacts were frozen anew, the strides of a strip that extends from a
+box onto the ground scattered by 3.7 % with integrator and step; with a tenth they agree within 0.03 %.
 """

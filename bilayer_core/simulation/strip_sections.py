@@ -34,6 +34,8 @@ largest, that may be a jump."""
 CONVEX = 4.0
 """x = √Λ κ₁, or √Λ ψ, natural or as it is, below which the law is convex: from 7.5 on some tangents are negative."""
 FOLDS = "folds: its parts are in two shapes of rest, and where these meet depends on the mesh"
+ROUNDING = 1e-9
+"""Of the square of a natural twist."""
 BETWEEN = np.linspace(0.0, 1.0, 17)
 """Where the law is looked at between the strains of two joints."""
 
@@ -139,12 +141,17 @@ def folds(model: Model, state: State) -> dict[str, str]:
         return found
     rest, strains, inside = _rest(model, state), _strains(model, state), _inside(model)
     _, twist, across = natural = _natural(model, rest)
-    active = (across != 0.0) | (twist**2 != model.flattening.start)
     for strand in model.strands:
         own = _joints_of(model, strand)
         if _jumps(model, rest, natural, strains, own[inside[own]]):
-            found[strand.rod] = "folded" if active[own].any() else "creased"
+            active = across[own].any() or _is_turned(model, twist)[own].any()
+            found[strand.rod] = "folded" if active else "creased"
     return found
+
+
+def _is_turned(model: Model, twist: Array) -> Array:
+    """Return which strip joints have another natural twist than their borders, which fibres that swell give them."""
+    return ~np.isclose(twist**2, model.flattening.start, rtol=ROUNDING, atol=0.0)
 
 
 def shapes(model: Model, state: State) -> dict[str, str]:
@@ -158,7 +165,7 @@ def shapes(model: Model, state: State) -> dict[str, str]:
     along, across = map(np.abs, curvatures(model, state))
     for strand in model.strands:
         own = _joints_of(model, strand)
-        if natural[own].any() and not (twist**2 != model.flattening.start)[own].any():
+        if natural[own].any() and not _is_turned(model, twist)[own].any():
             shape = "rolled across" if (across > ACROSS * along)[own].all() else "curled along"
             found.setdefault(strand.rod, shape)
     return found
@@ -180,6 +187,8 @@ def _jumps(
     step, size = np.diff(strain, axis=0), next((of.max() for of in sizes if of.any()), 0.0)
     alike = np.abs(np.diff(free, axis=0)).max(axis=1, initial=0.0) <= JUMP * size
     far = np.flatnonzero((np.hypot(*step.T) > JUMP * size) & alike)
+    if not len(far):
+        return False
     way = step[far] * length[far]
     between = strain[far, :, None] * length[far, :, None] + way[:, :, None] * BETWEEN
     of = _law(model, rest, np.repeat(own[far], len(BETWEEN)), between[:, 0].ravel(), between[:, 1].ravel())

@@ -35,9 +35,12 @@ def turned(angle, vector):
 
 
 class Strip:
-    """Layers from the bottom, each (thickness, compliance in its axes, strain (ε1, ε2) that it would have, angle)."""
+    """Layers from the bottom, each (thickness, compliance in its axes, strain (ε1, ε2) that it would have, angle), and
+    perhaps the curvature and twist (κ, τ) that it would have.
+    """
 
-    def __init__(self, width, layers, degree=30):
+    def __init__(self, width, layers, degree=30, strained=0.0):
+        """Take layers; their borders are as long as those of a strip that is twisted by `strained` [1/m]."""
         y, weight = np.polynomial.legendre.leggauss(degree + 12)
         self.width, y = width, 0.5 * width * y
         self.height = sum(layer[0] for layer in layers)
@@ -47,17 +50,18 @@ class Strip:
         one, none = np.ones((len(y), 1)), np.zeros((len(y), degree))
         self._parts = []  # height, weight, stiffness and free strain of points through the thickness
         low = -0.5 * self.height
-        for thickness, compliance, free, angle in layers:
+        for thickness, compliance, free, angle, *bent in layers:
             stiffness = np.linalg.inv(compliance)
             frame = np.array([turned(-angle, unit) for unit in np.eye(3)]).T  # of x, y in the axes of the fibres
             q = frame.T @ stiffness @ frame
             eigen = turned(angle, (*free, 0.0))
             for point, part in zip(POINTS, WEIGHTS, strict=True):
-                z = low + 0.5 * thickness * (1 + point)
-                self._parts.append((z, 0.5 * thickness * part, q, eigen))
+                up = 0.5 * thickness * point
+                own = up * np.array([bent[0][0], 0.0, 2.0 * bent[0][1]]) if bent else 0.0
+                self._parts.append((low + 0.5 * thickness + up, 0.5 * thickness * part, q, eigen - own))
             low += thickness
         self._y, self._weight, self._rise, self._bend = y, 0.5 * width * weight, rise, bend
-        self._mean, self._none = np.hstack([one, y[:, None]]), none
+        self._mean, self._none, self._strained = np.hstack([one, y[:, None]]), none, strained
 
     def energy(self, along, twist):
         """The least energy per length at given κ and τ."""
@@ -68,9 +72,8 @@ class Strip:
             x = np.hstack([self._mean, -along * self._rise, self._none, self._none])
             across = np.hstack([zero, -z * self._bend, self._bend, self._none])
             shear = np.hstack([zero, self._none, self._none, self._bend])
-            known = np.stack(
-                [0.5 * twist**2 * y**2 - z * along - eigen[0], 0 * y - eigen[1], -2 * z * twist - eigen[2] + 0 * y]
-            )
+            stretch = 0.5 * (twist**2 - self._strained**2) * y**2
+            known = np.stack([stretch - z * along - eigen[0], 0 * y - eigen[1], -2 * z * twist - eigen[2] + 0 * y])
             scale = np.sqrt(part * self._weight)
             for r in range(3):
                 rows.append(scale[:, None] * (root[r, 0] * x + root[r, 1] * across + root[r, 2] * shear))

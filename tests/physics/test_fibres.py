@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from oracles.plate_strip_across import Strip, orthotropic
 from support.evaluations import Problem, check
 from support.sample_scenes import GEL, fixed, layer, rod, scene
 
@@ -105,8 +106,101 @@ def test_two_rods_cannot_have_fibres():
         Simulator(load_scene(crossed()), model="two_rod")
 
 
-def test_a_natural_curvature_of_a_layer_beside_fibres_is_refused():
-    content = crossed()
-    content["rods"][0]["layers"][0]["natural_curvature"] = 3.0
-    with pytest.raises(SceneError, match="takes no `natural_curvature`, and bottom has one"):
-        Simulator(load_scene(content), model="laminate")
+BENT = {"natural_curvature": {"at": [0.0, 6e-3], "value": [3.0, 9.0]}, "natural_twist": 5.0}
+
+
+def varied(part=0.7, **how):
+    """The strip of `crossed`, whose lower layer ends at a part of its length, and whose upper one grows thicker and
+    stiffer along it; both are curved and twisted by themselves.
+    """
+    content = crossed(**how)
+    length = content["rods"][0]["path"]["length"]
+    for own in content["rods"][0]["layers"]:
+        own |= BENT
+    bottom, top = content["rods"][0]["layers"]
+    bottom["interval"] = [0.0, part * length]
+    top["thickness"] = {"at": [0.0, length], "value": [0.2e-3, 0.3e-3]}
+    top["stiffness"] = {"at": [0.3 * length, 0.6 * length], "value": [1.0, 2.0]}
+    return content
+
+
+@pytest.mark.parametrize("part", [0.35, 0.7])
+@pytest.mark.parametrize("ratios", [(0.4, 0.4), (0.1, 0.45)])
+def test_derivatives_agree_with_differences_where_sections_with_fibres_vary(part, ratios):
+    problem = Problem(varied(part, ratios=ratios), np.random.default_rng(1), "laminate", dimension=3)
+    assert problem.model.off_axis.exists and problem.model.flattening.coupling.all()
+    check(problem, ("flattening",))
+    check(problem)
+
+
+def test_the_work_of_a_stimulus_is_what_a_strip_gains_whose_sections_vary():
+    content = varied(0.4, stations=15) | {"gravity": [0.0, 0.0, -9.81]}
+    ramp = {"type": "ramp", "start": 0.005, "end": 0.015, "from": 0.4, "to": 1.0}
+    content["stimuli"]["humidity"]["schedule"] = ramp
+    content["solver"] = {"integrator": "sdirk2", "dt": 2e-5, "newton_tolerance": 1e-10}
+    simulator = Simulator(load_scene(content), model="laminate", budget=True)
+    simulator.run(0.02)
+    simulator.set_stimulus("humidity", 0.2)  # a jump
+    simulator.run(0.01)
+    assert abs(simulator.summary()["numerical_energy"]) < 1e-3 * simulator.summary()["largest_energy"]
+
+
+def rest(content):
+    """Curvature and twist at inner nodes at rest [1/m], shape (n_node − 2, 2)."""
+    simulator = Simulator(load_scene(content), model="laminate")
+    simulator.solve_static()
+    model, twist = simulator.model, np.zeros(simulator.model.node_count)
+    joints = np.arange(model.rods.bend_count)
+    twist[model.joint_node[joints]] = simulator._state.twist[joints] / model.voronoi_length[joints]
+    return np.stack([simulator.curvatures, twist], axis=1)[1:-1]
+
+
+@pytest.mark.parametrize("fibres", [STIFF, {"across": {"swelling": 0.0}}, {}])
+@pytest.mark.parametrize("part", [0.6, 0.4])
+def test_a_patch_with_fibres_bends_and_twists_as_a_strip_of_its_section(fibres, part):
+    """The curve is on the axis of the patch, or on that of the rest, which neither bends nor twists."""
+    whole, patch = (crossed(stations=41, ratios=(0.1, 0.45), fibres=fibres) for _ in range(2))
+    patch["rods"][0]["layers"][0]["interval"] = [0.0, part * patch["rods"][0]["path"]["length"]]
+    for content in (whole, patch):
+        content["rods"][0]["layers"][1]["eigenstrain"] = None
+    wanted, found = rest(whole), rest(patch)
+    assert np.abs(wanted[2]).max() > 1.0
+    assert found[2:13] == pytest.approx(wanted[2:13], rel=1e-4, abs=1e-4)
+    assert found[-10:] == pytest.approx(np.zeros((10, 2)), abs=1e-4)
+
+
+def test_crossed_layers_that_grow_thicker_bend_and_twist_by_the_thickness_of_the_place():
+    content = crossed(30.0, 1e-3, 41, fibres={"across": {"swelling": 0.0}})
+    length = content["rods"][0]["path"]["length"]
+    for own in content["rods"][0]["layers"]:
+        own["thickness"] = {"at": [0.0, length], "value": [0.1e-3, 0.2e-3]}
+        own["eigenstrain"] = {**HUMID, "gain": 1e-3}
+    whole = 2.0 * np.interp(np.linspace(0.0, length, 41), [0.0, length], [0.1e-3, 0.2e-3])[1:-1]
+    wanted = 1.5 * 0.5e-3 / whole[:, None] * [math.cos(math.pi / 3.0), math.sin(math.pi / 3.0)]
+    assert np.abs(rest(content)) == pytest.approx(wanted, rel=2e-3)
+
+
+@pytest.mark.parametrize(("width", "thin"), [(4e-3, 1.0), (20e-3, 0.1)])
+@pytest.mark.parametrize("fibres", [STIFF, {}])
+def test_layers_with_fibres_that_are_curved_and_twisted_bend_as_a_plate(width, thin, fibres):
+    content = crossed(width=width, stations=31, ratios=(0.1, 0.45), fibres=fibres)
+    content["rods"][0]["path"]["length"] = 0.1
+    plates, bent = [], (6.0 * thin, 3.0 * thin)
+    for own, ratio in zip(content["rods"][0]["layers"], (0.1, 0.45), strict=True):
+        own |= {"thickness": thin * own["thickness"], "eigenstrain": None}
+        own |= {"natural_curvature": bent[0], "natural_twist": bent[1]}
+        stiff = own["fibres"].get("along", {}).get("stiffness", 1.0) * GEL["youngs_modulus"]
+        shear = own["fibres"].get("shear", 1.0) * GEL["youngs_modulus"] / (2.0 * (1.0 + ratio))
+        compliance = orthotropic(stiff, GEL["youngs_modulus"], ratio, shear)
+        plates.append((own["thickness"], compliance, (0.0, 0.0), own["fibres"]["angle"], bent))
+    plate = Strip(width, plates, strained=bent[1])
+    assert rest(content)[15] == pytest.approx(plate.rest(rest(content)[15]), rel=2e-3)
+
+
+@pytest.mark.parametrize(("width", "twist"), [(4e-3, 30.0), (20e-3, 3.0)])
+@pytest.mark.parametrize("fibres", [None, {"angle": 0.5, **STIFF}])
+def test_a_single_layer_rests_at_its_natural_twist_however_wide(width, twist, fibres):
+    content = crossed(width=width, stations=21)
+    content["rods"][0]["layers"] = [layer("top", 0.3e-3, "top", natural_twist=twist, fibres=fibres)]
+    del content["stimuli"]
+    assert rest(content) == pytest.approx(np.tile([0.0, twist], (19, 1)), abs=1e-6)

@@ -8,7 +8,7 @@ from bilayer_core import Simulator, load_scene
 from bilayer_core.contact.between_stations import SAG
 from bilayer_core.model.build_model import build_model
 from bilayer_core.testing.gaps import GapCheck
-from bilayer_core.verification.validate.friction import stride, two_boxes
+from bilayer_core.verification.validate.friction import box_on_ground, stride, two_boxes
 
 D_HAT, THICK, WIDTH, LENGTH, STATIONS = 2e-4, 1e-3, 0.02, 0.1, 41
 SOFT = {"gel": {"youngs_modulus": 1e6, "poisson_ratio": 0.4, "density": 1000.0, "retardation_time": 0.01}}
@@ -73,6 +73,13 @@ def test_the_friction_of_a_box_is_integrated_along_edges(dimension):
 def test_the_friction_of_boxes_is_integrated_along_edges_where_they_meet(dimension, meet):
     way, expected = stride(0.4, 0.5, 21, two_boxes(meet), dimension)
     assert way == pytest.approx(expected, rel=0.01)
+
+
+@pytest.mark.parametrize("end", [0.044, 0.0446])
+def test_the_stride_where_a_strip_rests_on_a_boxs_edge_is_that_of_all_integrators(end):
+    euler = [{"integrator": "implicit_euler", "dt": dt} for dt in (4e-3, 1e-3)]
+    ways = [stride(0.4, 0.5, 41, box_on_ground(end), solver=solver)[0] for solver in ({}, *euler)]
+    assert ways == pytest.approx(3 * [ways[0]], rel=1e-3)
 
 
 EDGES = {

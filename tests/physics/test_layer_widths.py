@@ -114,7 +114,7 @@ def test_figures_of_a_tee_say_how_far_its_layers_would_bend_it():
         ({"layers": [layer("a", width=1e-3), layer("b", width=2e-3)]}, "rods.rod.width: found 0.003; must be left out"),
         ({"width": None}, "rods.rod.width: found null; must be given"),
         ({"layers": [layer("a", width=-1e-3), layer("b")]}, "rods.rod.layers.a.width"),
-        ({"section": "strip"}, "needs layers of one width, that of the rod, and flange has a `width`"),
+        ({"section": "strip"}, "needs layers of one `width`, since a plate has one thickness"),
         (
             {"width": None, "radius": 1e-3, "layers": [{"name": "a", "material": "gel", "width": 2e-3}]},
             "layers.a.width",

@@ -85,26 +85,12 @@ def test_the_height_and_the_fold_of_layers_of_unlike_ratio_are_those_of_their_ow
     assert f"at most {limit:.3g} (" in told["as a strip it swells up to w²κ/H of"].limit
     natural = plate_section(loaded, loaded.rods[0]).natural(1)
     assert natural.across == pytest.approx(natural.along, rel=1e-12)
-    height = 0.006667 * abs(natural.across) * 0.03**2 / 8.0
+    height = 0.006667 * abs(natural.across[0]) * 0.03**2 / 8.0
     assert told["its section rises by"].value == f"{1e3 * height:.3g} mm across"
 
 
-@pytest.mark.parametrize(
-    ("more", "reason"),
-    [
-        ({"interval": [0, 0.1]}, "needs layers that cover all of it, and q has an `interval`; allowed: beam"),
-        ({"thickness": {"at": [0, 0.2], "value": [0.2e-3, 0.3e-3]}}, "needs one thickness all along it"),
-        ({"stiffness": {"at": [0, 0.2], "value": [1, 2]}}, "needs one stiffness all along it"),
-    ],
-)
-def test_a_strip_with_fibres_that_cannot_be_computed_is_refused_with_the_reason(more, reason):
-    with pytest.raises(SceneError, match=f"strip of fibres or of unlike poisson_ratio {reason}"):
-        Simulator(load_scene(wide("strip", more={**more, "fibres": {"angle": 0.5}})))
-    Simulator(load_scene(wide("strip", more=more)))
-
-
-def test_a_strip_takes_its_twist_from_its_path():
-    with pytest.raises(SceneError, match="takes its twist from its path, and q has a `natural_twist`"):
+def test_a_strip_needs_layers_that_are_twisted_alike_by_themselves():
+    with pytest.raises(SceneError, match="needs layers with one `natural_twist`: the borders of unlike ones"):
         Simulator(load_scene(wide("strip", more={"natural_twist": 2.0})))
 
 

@@ -180,7 +180,7 @@ def law(lower, upper):
     layers = [layer(name, material=name) for name in gels]
     layers[0]["eigenstrain"] = {"stimulus": "heat", "gain": 0.01}
     loaded = load_scene(scene([rod(layers)], stimuli=HEAT, materials=gels))
-    return law_of(loaded, loaded.rods[0]), plate_section(loaded, loaded.rods[0]).growth[3]
+    return law_of(loaded, loaded.rods[0]), plate_section(loaded, loaded.rods[0]).growth[3][0]
 
 
 def test_the_curvature_of_a_wide_strip_is_that_of_independent_programs():

@@ -53,7 +53,7 @@ class Drives:
     driven_weight: Vector  # its part of the law's eigenstrain, shape (n_driven,)
     joint_rest: Matrix  # κ̄₁ κ̄₂ ψ̄ without stimuli, κ̄y Δl of strips [rad], multiples of `Moduli`, shape (n_joint rest, 3)
     driven_joint: Indices  # rows of `joint_rest` that follow a law, once for each law, shape (n_driven_joint,)
-    driven_joint_column: Indices  # which value of the row does: 0, κ̄₁ or κ̄y Δl, or of a strip 2, ψ̄, likewise
+    driven_joint_column: Indices  # which of the row: 0, κ̄₁ or κ̄y Δl, or of a strip 1, κ̄x Δl − κ̄₁, or 2, ψ̄
     driven_joint_law: Indices  # likewise
     driven_joint_weight: Vector  # that value per eigenstrain of the law [rad], likewise
     field_channel: Indices  # stimulus channel of each field: what materials reach of it, by its modes, shape (n_field,)
@@ -96,7 +96,7 @@ class Plane:
 class OffAxis:
     """Joints whose natural curvature depends on the strains of their edges; see `forces.bend_twist`."""
 
-    joint: Indices  # whose κ̄₁ depends on the strains of its edges, shape (n_coupled,)
+    joint: Indices  # whose κ̄₁ depends on the strains of its edges, in order, shape (n_coupled,)
     slope: Matrix  # b/|ē| of either edge, ∂κ̄₁ by its length, 0 for a clamp edge [rad/m], shape (n_coupled, 2)
     rest: Matrix = ("joint", 3)  # of all joints at the present strains [rad]
 

@@ -214,6 +214,7 @@ def stride(
     stations: int,
     obstacles: tuple[dict, ...] = (GROUND,),
     dimension: int | str = "auto",
+    solver: dict | None = None,
 ) -> tuple[float, float]:
     """Return the way of the middle of a strip [mm] that extends evenly and goes back, and what it must be.
 
@@ -234,7 +235,7 @@ def stride(
         start="settle",
         duration=2.2,
     )
-    content["solver"] = {}
+    content["solver"] = dict(solver or {})
     simulator = Simulator(load_scene(content), dimension=dimension)
     simulator.run()
     middle = simulator.rods["rod"].positions[stations // 2, 0] - 0.5 * STRIP

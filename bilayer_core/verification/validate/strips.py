@@ -85,9 +85,10 @@ def _rest(simulator: Simulator, values: tuple[float, ...] = (1.0,)) -> tuple[flo
     return strip.curvature[node], strains[2] / (strip.arc_length[node + 1] - strip.arc_length[node])
 
 
-def crossed(degrees: float, ratio: float, stiffness: float = 1.0) -> tuple[float, float]:
+def crossed(degrees: float, ratio: float, stiffness: float = 1.0, patch: bool = False) -> tuple[float, float]:
     """Return κ/κ₀ and τ/κ₀ of two layers with fibres at right angles, along which they do not swell, by w²κ₀/H: the
-    lower one swells at the angle to the strip. At 45° a wide one may bend either way: κ is its size, of one joint.
+    lower one swells at the angle to the strip. At 45° a wide one may bend either way: κ is its size, of one joint. A
+    patch is the middle of a strip whose lower layer is no longer, so that the curve is on the axis of the upper one.
     """
     thickness = 0.1 * THICKNESS * min(1.0, 100.0 / ratio)  # so thin that its borders matter little in twist
     curvature = ratio * thickness / WIDTH**2
@@ -97,10 +98,18 @@ def crossed(degrees: float, ratio: float, stiffness: float = 1.0) -> tuple[float
         layer(name, 0.5 * thickness, eigenstrain=law, fibres={"angle": math.radians(angle), "along": along})
         for name, angle in (("bottom", degrees - 90.0), ("top", degrees))
     ]
+    if patch:
+        layers[0]["interval"] = [0.06, 0.14]
     simulator = _loaded(layers, {"gel": 0.3}, stations=3 if degrees == 45.0 else 21)
     # in steps: a strip that is flat while it swells may go to another shape at rest
     bend, twist = _rest(simulator, tuple(np.geomspace(min(0.1, 1.0 / ratio), 1.0, 60)))
     return (abs(bend) if degrees == 45.0 else bend) / curvature, twist / curvature
+
+
+def naturally_twisted(ratio: float) -> tuple[float, float]:
+    """Return the twist of a strip of one layer, and that of the layer by itself, by its w²τ̄/H."""
+    twist = ratio * THICKNESS / WIDTH**2
+    return _rest(_loaded([layer("only", THICKNESS, natural_twist=twist)], {"gel": 0.3}))[1], twist
 
 
 def of_unlike_ratios(ratio: float) -> float:
@@ -207,6 +216,26 @@ def _narrow_case(degrees: float, which: int) -> Case:
     )
 
 
+CASES += [
+    Case(
+        f"strips/crossed layers in a patch, fibres 8 times as stiff, cut at 30°/w²κ₀/H 6/{name}",
+        PLATE,
+        1e-3,
+        lambda which=which: (crossed(30.0, 6, 8.0, patch=True)[which], RESTS[30.0, 8.0][6][which]),
+        scale=1.0,
+    )
+    for which, name in enumerate(("curvature", "twist"))
+]
+CASES += [
+    Case(
+        f"strips/natural twist/w²τ̄/H {ratio:g}",
+        "that of the layer by itself",
+        1e-6,
+        lambda ratio=ratio: naturally_twisted(ratio),
+        "1/m",
+    )
+    for ratio in (0.1, 3)
+]
 CASES += [_narrow_case(degrees, which) for degrees in (30.0, 45.0, -20.0) for which in (0, 1)]
 CASES += [
     _crossed_case(degrees, stiffness, ratio, which)
