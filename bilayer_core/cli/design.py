@@ -23,7 +23,7 @@ from bilayer_core.errors import InputError
 @click.option(
     "--vary", multiple=True, required=True, metavar="PATH=LO:HI[:POINTS]", help="A number, or a profile along the rod."
 )
-@click.option("--smoothness", type=click.FloatRange(min=0.0), help="Weight of the roughness of patterns; 1e-3.")
+@click.option("--smoothness", type=click.FloatRange(min=0.0), help="Weight of roughness of patterns; default: 1e-3.")
 @set_option
 @click.option("--out", metavar="DIR", help="Write the scene, the pattern as csv, a report and a picture.")
 @click.option("--force", is_flag=True, help="Replace existing files.")

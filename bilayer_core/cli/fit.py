@@ -25,7 +25,7 @@ WIDTH = 140
 @scene_argument
 @click.option("--data", required=True, metavar="FILE.csv", help="Columns: time, and quantities such as com.z [mm].")
 @click.option(
-    "--parameter", "parameters", multiple=True, required=True, metavar="PATH=LO:HI[:START]", help="What is fitted."
+    "--parameter", "parameters", multiple=True, required=True, metavar="PATH=LO:HI[:START]", help="A number to fit."
 )
 @click.option("--sigma", multiple=True, metavar="QUANTITY=VALUE", help="Noise of a column; estimated if there is none.")
 @set_option

@@ -20,10 +20,10 @@ NOT_CONFIRMED = 1
 @click.option("--maximise", metavar="METRIC", help="Search for its largest value.")
 @click.option("--minimise", metavar="METRIC", help="Search for its least value.")
 @click.option("--trials", type=click.IntRange(1), default=100, show_default=True, help="Runs, resumed ones included.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of the search.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the search.")
 @click.option("--out", metavar="DIR", default=DEFAULT_DIRECTORY, show_default=True, help="Where results are written.")
 @processes_options
-@click.option("--resume", is_flag=True, help="Go on with the runs in DIR.")
+@click.option("--resume", is_flag=True, help="Continue with the runs in DIR.")
 @click.option("--force", is_flag=True, help="Replace the results in DIR.")
 @click.option("--plot", "plotted", is_flag=True, help="Draw the results.")
 @click.option("--quiet", is_flag=True, help="No progress.")

@@ -34,12 +34,12 @@ class Limits(click.ParamType):
 @click.argument("logs_and_quantities", metavar="LOG.mcap|BAG... QUANTITY...", nargs=-1, required=True)
 @click.option("--x", "over", metavar="QUANTITY", help="Draw over this instead of time: com.x.")
 @click.option("--xlim", type=Limits(), metavar="A:B", help="Limits, in the unit that the axis shows.")
-@click.option("--ylim", type=Limits(), metavar="A:B", help="Likewise; of one panel.")
-@click.option("--title", default="", metavar="TEXT", help="Above the figure.")
+@click.option("--ylim", type=Limits(), metavar="A:B", help="Likewise, of a single panel.")
+@click.option("--title", default="", metavar="TEXT", help="Title above the figure.")
 @click.option("--out", metavar="FIGURE", help="Write a .pdf, .png or .svg instead of opening a window.")
 @click.option("--node", type=int, metavar="N", help="Which node of rods; -1 is the last one, the default.")
-@click.option("--width", default="single", metavar="W", help="Of the figure: single or double column, or millimetres.")
-@click.option("--label", "labels", multiple=True, metavar="TEXT", help="What the legend calls a log; once for each.")
+@click.option("--width", default="single", metavar="W", help="Width: single or double column, or millimetres.")
+@click.option("--label", "labels", multiple=True, metavar="TEXT", help="Name of a log in the legend; once for each.")
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def plot(
     logs_and_quantities: tuple[str, ...],

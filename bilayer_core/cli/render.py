@@ -46,7 +46,9 @@ class Size(click.ParamType):
 @click.option("--gif", metavar="OUT.gif|OUT.webp", help=f"An animation, {GIF_RATE:g} pictures a second.")
 @click.option("--mp4", metavar="OUT.mp4", help="A film.")
 @click.option("--at", "times", type=Duration(from_zero=True), multiple=True, help="Simulated time; may be repeated.")
-@click.option("--frames", type=click.IntRange(1, MOST_OF_FILM), metavar="N", help="How many, evenly over the run.")
+@click.option(
+    "--frames", type=click.IntRange(1, MOST_OF_FILM), metavar="N", help="How many pictures, evenly over the run."
+)
 @click.option(
     "--camera",
     metavar="CAMERA",
@@ -62,9 +64,11 @@ class Size(click.ParamType):
     "--colour",
     type=click.Choice(["strain", "curvature", "section", "contact"]),
     default="strain",
-    help="What the colours of rods say; section is the curvature across strips, contact the pressure of contact.",
+    help="Quantity that colours rods; section is the curvature across strips, contact the contact pressure.",
 )
-@click.option("--fps", type=click.FloatRange(1.0, 100.0), metavar="N", help=f"Of a film; default {FILM_RATE:g}.")
+@click.option(
+    "--fps", type=click.FloatRange(1.0, 100.0), metavar="N", help=f"Pictures a second of film; default {FILM_RATE:g}."
+)
 @click.option(
     "--speed",
     type=click.FloatRange(0.0, 1e6, min_open=True),

@@ -55,18 +55,18 @@ OUTPUT_SUFFIXES = {"log": ".mcap", "rrd": ".rrd", "summary": ".json", "save_stat
     metavar="HZ",
     help="Frames recorded per simulated second; the run stays the same.",
 )
-@click.option("--tf", is_flag=True, help="Have frames of bodies and ends of rods on /tf in the log.")
+@click.option("--tf", is_flag=True, help="Log frames of bodies and ends of rods on /tf.")
 @click.option("--rrd", metavar="FILE.rrd", help="Write a rerun recording.")
 @click.option("--summary", metavar="FILE.json|-", help="Write all figures of the run; - is standard output.")
 @click.option("--settle", is_flag=True, help="Start at the static equilibrium: `--set start=settle`.")
 @click.option("--save-state", metavar="FILE.npz", help="Write the last state.")
-@click.option("--from-state", metavar="FILE", help="Go on from a saved state, or from the end of a log.")
-@click.option("--at", type=Duration(from_zero=True), metavar="T", help="Of the log of --from-state, its state at T.")
+@click.option("--from-state", metavar="FILE", help="Continue from a saved state, or from the end of a log.")
+@click.option("--at", type=Duration(from_zero=True), metavar="T", help="Start from the log of --from-state at T.")
 @click.option("--budget", is_flag=True, help="Show where the energy went (steps cost four to thirteen times as much).")
 @click.option("--error-estimate", is_flag=True, help=ERROR_HELP)
 @click.option("--quarter-step", is_flag=True, help=QUARTER_HELP)
 @click.option("--force", is_flag=True, help="Replace existing files.")
-@click.option("--verbose", is_flag=True, help="Tell all figures, and what was chosen for the scene.")
+@click.option("--verbose", is_flag=True, help="Show all figures, and what was chosen for the scene.")
 @click.option("--quiet", is_flag=True, help="Neither progress nor summary.")
 def run(scene: str, duration: float | None, overrides: tuple[str, ...], quiet: bool, **options: Any) -> None:
     """Simulate SCENE as fast as this machine can."""

@@ -21,7 +21,7 @@ DEFAULT_DIRECTORY = "runs/stress"
 @click.option("--only", multiple=True, metavar="PATTERN", help="Cases of this name: 'torture/*', 'dt/*/drop/*'.")
 @click.option("--scene", "scenes", multiple=True, metavar="FILE.yaml", help="Judge a scene of your own instead.")
 @click.option("--list", "listed", is_flag=True, help="Name the cases and why they are outside the region of validity.")
-@click.option("--resume", is_flag=True, help="Go on with the results in DIR.")
+@click.option("--resume", is_flag=True, help="Continue with the results in DIR.")
 @click.option("--out", metavar="DIR", default=DEFAULT_DIRECTORY, show_default=True, help="Where results are written.")
 @json_option("Write all results to one file")
 @click.option("--workers", type=click.IntRange(1), help="Cases side by side; default: one a core.")

@@ -17,8 +17,8 @@ FOLLOWING = ("node", "bind", "port", "serve")
 
 @click.command(cls=Verb, old_spellings={"--time": "--at"})
 @click.argument("file", metavar="[FILE.mcap|BAG|FILE.rrd]", required=False)
-@click.option("--follow", is_flag=True, help="Show a run while it goes on: of a node, or in a log that is written.")
-@click.option("--node", metavar="NAME", help=f"Which node to follow; default: {NODE}.")
+@click.option("--follow", is_flag=True, help="Show a run as it goes on: of a node, or of a log that is being written.")
+@click.option("--node", metavar="NAME", help=f"Node to follow; default: {NODE}.")
 @click.option("--serve", is_flag=True, help="With --follow: open no window, say only where viewers may connect.")
 @click.option("--bind", metavar="ADDRESS", help="With --follow: listen there; default: 127.0.0.1, this machine alone.")
 @click.option(
