@@ -42,7 +42,7 @@ PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"), (1e-12, "p"))
 WITH_PREFIX = ("m", "N", "J", "N m", "s", "m/s")
 KINDS = {"m": "position", "N": "force", "N m": "moment", "J": "energy", "1/m": "curvature"}
 """What a panel with several quantities shows, by its unit."""
-SYMBOLS = {"degC": "°C", "deg": "°"}
+SYMBOLS = {"degC": "°C", "deg": "°", "um": "µm", "us": "µs", "uN": "µN"}
 """Units that papers print in another way."""
 AXIS_LETTERS, MARGIN = 24, 0.03
 """In a line beside a panel; and of an axis beyond the curves, but for time."""

@@ -130,6 +130,19 @@ def test_axes_have_the_units_of_parameters_and_metrics_and_curves_fit_them(tmp_p
     assert title.get_window_extent().x0 > 0 and not title.get_window_extent().overlaps(legend.get_window_extent())
 
 
+@pytest.mark.parametrize(("most", "told"), [(40.0, ["1", "2", "5", "10", "20"]), (1e5, ["$\\mathdefault{10^{1}}$"])])
+def test_a_logarithmic_axis_of_few_decades_has_plain_numbers(tmp_path, monkeypatch, most, told):
+    from matplotlib.figure import Figure
+
+    shown = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, path: shown.append(figure) or path.write_bytes(b"-"))
+    points = [{"a": a} for a in (0.9, 3.0, most)]
+    draw(result(points, about("a", units={"a": "um"}, logarithmic=("a",))), tmp_path)
+    shown[0].canvas.draw()
+    assert shown[0].axes[0].get_xlabel() == "a [µm]"
+    assert {*told} <= {text.get_text() for text in shown[0].axes[0].get_xticklabels()}
+
+
 def test_results_come_back_from_their_table(tmp_path):
     given = result(grid(3), about("a", "b", units={"a": "mm"}, logarithmic=("b",), title="A title"))
     with Journal(tmp_path, {}) as journal:

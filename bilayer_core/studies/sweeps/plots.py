@@ -23,6 +23,7 @@ WIDTH, HEIGHT = 110.0, 78.0
 """Of a picture [mm]."""
 MOST_LINES = 8
 """Values of a second parameter that are lines of their own."""
+DECADES = 3
 MAP, MISSING = "viridis", "#bbbbbb"
 Column = np.ndarray
 
@@ -107,6 +108,19 @@ def _scale(result: SweepResult, name: str) -> str:
     return "log" if name in result.about.logarithmic else "linear"
 
 
+def _set_scale(axes: Any, which: str, result: SweepResult, name: str) -> None:
+    """Set the scale of an axis; a logarithmic one of less than `DECADES` decades has plain numbers at 1, 2, 5, 10, …"""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    axes.set(**{f"{which}scale": _scale(result, name)})
+    axis = getattr(axes, f"{which}axis")
+    values = [row.parameters[name] for row in result.rows]
+    if _scale(result, name) == "log" and max(values) < 10**DECADES * min(values):
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter(NullFormatter())
+
+
 def _values(result: SweepResult, rows: list[Row], name: str) -> Column:
     """Return a column of some rows, in the unit of its label."""
     found = [row.parameters.get(name, row.metrics.get(name)) for row in rows]
@@ -128,7 +142,8 @@ def _lines(
     lost = [row for row in result.rows if row.outcome.value != "done"]
     for k, x in enumerate(_values(result, lost, along)):
         axes.axvline(x, color=MISSING, linewidth=0.5, zorder=0, label=None if k else "no result")
-    axes.set(xlabel=_label(result, along), ylabel=_label(result, metric), xscale=_scale(result, along))
+    axes.set(xlabel=_label(result, along), ylabel=_label(result, metric))
+    _set_scale(axes, "x", result, along)
     if len(groups) > 1 or lost:
         figure.legend(loc="outside right center")
 
@@ -160,7 +175,8 @@ def _map(figure: Any, result: SweepResult, names: list[str], metric: str) -> Non
         )
         axes.legend(loc="upper left", bbox_to_anchor=(0.0, 1.1))
     axes.set(xlabel=_label(result, names[0]), ylabel=_label(result, names[1]))
-    axes.set(xscale=_scale(result, names[0]), yscale=_scale(result, names[1]))
+    _set_scale(axes, "x", result, names[0])
+    _set_scale(axes, "y", result, names[1])
     figure.colorbar(drawn, label=_label(result, metric))
 
 
