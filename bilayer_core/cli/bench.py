@@ -13,7 +13,9 @@ DEFAULT_DIRECTORY = "runs/bench"
 @click.command(cls=Verb)
 @click.option("--quick", is_flag=True, help="Fewer problems, meshes and steps: about 3 minutes.")
 @click.option("--out", metavar="DIR", default=DEFAULT_DIRECTORY, show_default=True, help="Where results are written.")
-@click.option("--only", multiple=True, metavar="NAME", help="A problem, or peers, scaling or start; may be repeated.")
+@click.option(
+    "--only", multiple=True, metavar="NAME", help="A problem, peers, scaling, start or commands; may be repeated."
+)
 @click.option("--list", "listing", is_flag=True, help="List the parts, and measure nothing.")
 @click.option("--resume", is_flag=True, help="Continue in DIR, on the same machine with the same versions.")
 @click.option("--force", is_flag=True, help="Replace what is in DIR.")
@@ -64,6 +66,7 @@ def _list(chosen: list[str]) -> None:
         "peers": "The cantilever by programs that install from PyPI",
         "scaling": "CPU time of a step against nodes",
         "start": "First step of a new process, kernels compiled and from the cache",
+        "commands": "Robots under a controller that acts every 40 ms",
     }
     for name in chosen:
         click.echo(f"{name:12}{titles[name]}")

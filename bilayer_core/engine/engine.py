@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from bilayer_core.engine.actuation import Actuation
 from bilayer_core.engine.capacity import CapacityError
 from bilayer_core.engine.energy_account import open_account
 from bilayer_core.engine.error_norm import ErrorNorm
-from bilayer_core.engine.integrate import Attempt, Clock, Counts, Failure, Integration, StepControl, clear, integrate
+from bilayer_core.engine.integrate import Attempt, Clock, Counts, Failure, Integration, StepControl, integrate
 from bilayer_core.engine.observables import Observables, observe
 from bilayer_core.engine.potential import add_forces, expand_to_unknowns
 from bilayer_core.engine.run_extrema import count_shape
@@ -21,6 +22,7 @@ from bilayer_core.errors import SimulationError
 from bilayer_core.forces.joints import Joints
 from bilayer_core.integrators.method import Method
 from bilayer_core.integrators.sdirk2 import METHOD as SELF_STARTING
+from bilayer_core.jit.record import Numbers
 from bilayer_core.model.bend_faces import bend_faces
 from bilayer_core.model.bent_plates import plates_of_bends
 from bilayer_core.model.contact_points import contact_point_names
@@ -62,6 +64,7 @@ class Engine:
         Value of each channel at the end of the last step, shape (n_channel,).
     extrema : RunExtrema
         Of the run.
+    numbers_of_extrema : Numbers
     passes : int
         Of Newton's method, in the last steps.
     """
@@ -73,6 +76,7 @@ class Engine:
         sizes = self._storage.sizes
         self._newton = newton_tolerance, max_iterations
         self._outcome, self.gap, self.passes = self._storage.outcome, math.inf, 0
+        self._numbers_of_outcome = Numbers(self._outcome)
         methods = (method, SELF_STARTING) if method.history else (method,)
         self._methods = [used.arrays() for used in methods]
         self._configurations = [new_configuration(model, sizes) for _ in range(3)]
@@ -81,8 +85,9 @@ class Engine:
         self._inputs = new_inputs(model, sizes, max(len(used.points) for used in methods))
         self.stimulus = self._inputs.applied
         self.actuation: Actuation | None = None
-        self._error_norm, self._counts = error_norm_of(model), Counts()
+        self._error_norm, self._counts = error_norm_of(model), Counts(shortest=math.inf)
         self._failure, self._attempt = Failure(), Attempt()
+        self._numbers, self._numbers_of_failure = Numbers(self._counts), Numbers(self._failure)
         self._state: State | None = None
         self._integration: Integration | None = None
         self._no_joints = Joints.absent()
@@ -98,6 +103,7 @@ class Engine:
             robot_mass=model.robot_mass,
             voronoi_length=model.voronoi_length,
         )
+        self.numbers_of_extrema = Numbers(self.extrema)
         self.start_over(-math.inf)
 
     def take_scene(self, model: Model, control: StepControl, newton_tolerance: float, max_iterations: int) -> None:
@@ -123,23 +129,23 @@ class Engine:
         After so many `passes` of Newton's method they pause before the next attempt at a step, after `patience` more
         within one. A step that did so may go on, from the same state.
         """
-        counts, outcome = self._counts, self._outcome
+        outcome = self._outcome
         outcome.passes, outcome.patience = passes, patience
         if not goes_on:
             self._attempt.rejected = 0
         self._storage.set_friction(state.friction)
-        clear(counts)
+        self._numbers.reset()
         done = integrate(self._parts_for(state), until, due, most, *self._newton)
-        status, pair = outcome.status, outcome.pair
-        self.passes = passes - outcome.passes
+        found = self._numbers_of_outcome.read()
+        status = found["status"]
+        self.passes = passes - found["passes"]
         if done > 0 or status in FAILURES:
-            self._take_end()
+            self._take_end(found)
             self._evaluated = False
-        figures = {name: getattr(counts, name) for name in counts.names}
+        figures = self._numbers.read()
         if status in FAILURES:
-            failure = self._failure
-            figures |= {name: getattr(failure, name) for name in failure.names}
-        return IntegrationReport(done, status, pair, **figures)
+            figures |= self._numbers_of_failure.read()
+        return IntegrationReport(done, status, found["pair"], **figures)
 
     def do_once(self, state: State, mode: int, length: float = 0.0, tolerance: float = math.inf) -> IntegrationReport:
         """Execute a request (`engine.request_modes`) on a state at rest, with the drive set; return a report."""
@@ -150,11 +156,11 @@ class Engine:
             status = treat_state(run.problem, run.state, run.work, mode, length, tolerance, self._newton[1])
             if not self.reserve(status, state):
                 break
-        outcome = self._outcome
-        self._take_end()
+        found = self._numbers_of_outcome.read()
+        self._take_end(found)
         self._evaluated = True
-        numbers = outcome.iterations, outcome.factorisations, outcome.settlings
-        return IntegrationReport(1, status, outcome.pair, *numbers, outcome.residual)
+        figures = {name: found[name] for name in ("pair", "iterations", "factorisations", "settlings", "residual")}
+        return IntegrationReport(1, status, **figures)
 
     def _parts_for(self, state: State) -> Integration:
         """Return the record that compiled steps take; the same object as long as all its parts are the same."""
@@ -185,10 +191,9 @@ class Engine:
             )
         return parts
 
-    def _take_end(self) -> None:
+    def _take_end(self, found: dict[str, Any]) -> None:
         """Note which configuration was evaluated last, and the smallest gap there."""
-        self.end = self._configurations[self._outcome.configuration]
-        self.gap = self._outcome.gap
+        self.end, self.gap = self._configurations[found["configuration"]], found["gap"]
 
     def reserve(self, status: int, state: State) -> bool:
         """Add the capacity that a step from a state lacked; return false if that is not what it lacked.

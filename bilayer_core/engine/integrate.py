@@ -145,13 +145,6 @@ class Integration:
     attempt: Attempt
 
 
-def clear(counts: Counts) -> None:
-    """Begin again to count."""
-    for name in counts.names:
-        setattr(counts, name, 0)
-    counts.shortest = math.inf
-
-
 @kernel
 def _end_of_fixed(control, clock):
     """Return the end of the present fixed step, of which parts may be done: on the grid of multiples of dt if its start

@@ -243,6 +243,32 @@ def record(declared: type) -> type:
     return type(declared.__name__, (Record,), body | {"names": names, "shapes": shapes, "changing": changing})
 
 
+class Numbers:
+    """Reads and resets the numbers of a record that change, all at once: each by itself takes 2 µs.
+
+    Parameters
+    ----------
+    made : Record
+        With the values that `reset` gives back to it.
+    """
+
+    def __init__(self, made: Record):
+        layout = made.layout()
+        self._made, self._memory = made, made._memory
+        self._floats = self._memory.view(np.float64)
+        self._start = self._memory.copy()
+        self._places = [(name, layout.fields[name] is float, layout.offset[name]) for name in made.changing]
+
+    def read(self) -> dict[str, Any]:
+        """Return the numbers by their names."""
+        whole, real = self._memory.tolist(), self._floats.tolist()
+        return {name: real[place] if is_real else whole[place] for name, is_real, place in self._places}
+
+    def reset(self) -> None:
+        """Give all numbers the values that they had at first."""
+        self._memory[:] = self._start
+
+
 def shapes_of(declared: type[Record], sizes: Mapping[str, int], names: Iterable[str]) -> dict[str, tuple[int, ...]]:
     """Return the declared shapes of some fields, in numbers."""
     return {

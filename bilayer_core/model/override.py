@@ -1,7 +1,8 @@
 """Values set from outside for a channel or a load in place of its schedule, at once or by a ramp.
 
-A row of `State.override` has the value that is reached, and of a ramp from which value, from when and until when [s];
-the last two are 0 for a jump. Where a schedule acts, all are NaN.
+A row of `State.override` has the value that is reached, and of a ramp from which value, from when and until when [s],
+and 1 if it is smooth; the last three are 0 for a jump. Where a schedule acts, all are NaN. A smooth ramp is half a wave
+of a cosine: it begins and ends at rest.
 """
 
 from __future__ import annotations
@@ -14,24 +15,24 @@ import numpy as np
 from bilayer_core.scene.spans import Span
 
 Array = np.ndarray
-VALUE, START, BEGIN, END = range(4)
-PARTS = 4
+VALUE, START, BEGIN, END, SMOOTHNESS = range(5)
+PARTS = 5
 """Of a row."""
 
 
 def no_overrides(count: int) -> Array:
-    """Return the rows of so many channels and loads of which none is set, shape (count, 4)."""
+    """Return the rows of so many channels and loads of which none is set, shape (count, 5)."""
     return np.full((count, PARTS), math.nan)
 
 
 def jump_to(value: float | None) -> Array:
     """Return a row that acts at once; without a value, a row that leaves the schedule in force."""
-    return np.full(PARTS, math.nan) if value is None else np.array([value, value, 0.0, 0.0])
+    return np.full(PARTS, math.nan) if value is None else np.array([value, value, 0.0, 0.0, 0.0])
 
 
-def ramp_to(value: float, start: float, begin: float, over: float) -> Array:
+def ramp_to(value: float, start: float, begin: float, over: float, smooth: bool) -> Array:
     """Return a row that leads from one value to another, in a time from `begin` on [s]."""
-    return np.array([value, start, begin, begin + over])
+    return np.array([value, start, begin, begin + over, smooth])
 
 
 def acts(row: Sequence[float]) -> bool:
@@ -41,9 +42,14 @@ def acts(row: Sequence[float]) -> bool:
 
 def spans_of(row: Sequence[float]) -> list[Span]:
     """Return an override as spans of a schedule: a ramp, if there is one, and the value that it reaches."""
-    value, start, begin, end = row
+    value, start, begin, end, smooth = row
     reached = Span(math.inf, value)
-    return [Span(end, start, begin, (value - start) / (end - begin)), reached] if end > begin else [reached]
+    if not end > begin:
+        return [reached]
+    if smooth:
+        half, middle = 0.5 * (value - start), 0.5 * (value + start)
+        return [Span(end, middle, begin, 0.0, half, math.pi / (end - begin), -0.5 * math.pi), reached]
+    return [Span(end, start, begin, (value - start) / (end - begin)), reached]
 
 
 def value_at(row: Sequence[float], time: float) -> float:

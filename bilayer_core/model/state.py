@@ -75,7 +75,7 @@ class State:
     transduction: Array  # stimulus that each mode of a material has reached, shape (n_mode,)
     conditions: Array  # number of all that a state may be taken into another scene for, shape (1,)
     seal: Array  # checksum of a flat state, 0 before it is one, shape (1,)
-    override: Array  # what is set from outside of channels, then of loads (`model.override`), shape (n, 4)
+    override: Array  # what is set from outside of channels, then of loads (`model.override`), shape (n, 5)
     friction: Array  # what is set from outside of its coefficients (`model.set_friction`), shape (4,)
     pose_goal: Array  # of controlled bodies; see `simulation.poses`, shape (n_controlled, 26), zeros where none acts
     fingerprint: Array  # of the scene it belongs to, shape (n_part,), or (0,) for a state that is never saved

@@ -3,8 +3,8 @@
 ============ ========================================== ================================================================
 kind         values                                     from
 ============ ========================================== ================================================================
-``stimulus`` value in the unit of the channel, over [s] `Simulator.set_stimulus`
-``load``     factor, over [s]                           `Simulator.set_load`
+``stimulus`` value in its unit, over [s], 1 if smooth   `Simulator.set_stimulus`
+``load``     factor, over [s], 1 if smooth              `Simulator.set_load`
 ``pose``     position [m], quaternion, least time [s]   `Simulator.set_pose`
 ``friction`` coefficient                                `Simulator.set_friction`
 ``until``    time [s]                                   whoever makes steps: where adaptive ones must end
@@ -12,7 +12,7 @@ kind         values                                     from
 ============ ========================================== ================================================================
 
 NaN stands for what is not given: of a stimulus or a load, its schedule acts again, of friction the scene's coefficient.
-Logs of earlier versions have no ``over``, which is 0 then: a jump.
+Linear ramps have no third value; logs of earlier versions have no ``over``, which is 0 then: a jump.
 """
 
 from __future__ import annotations
@@ -20,12 +20,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 Values = Sequence[float]
 STIMULUS, LOAD, POSE, FRICTION, UNTIL, RESET = "stimulus", "load", "pose", "friction", "until", "reset"
-SIZES = {STIMULUS: 2, LOAD: 2, POSE: 8, FRICTION: 1, UNTIL: 1, RESET: 0}
+SIZES = {STIMULUS: 3, LOAD: 3, POSE: 8, FRICTION: 1, UNTIL: 1, RESET: 0}
 """Number of values of each kind."""
+OPTIONAL = {STIMULUS: 2, LOAD: 2}
+"""How many of them may be missing, from the last on."""
+LINEAR, SMOOTH = "linear", "smooth"
+SHAPES = (LINEAR, SMOOTH)
+"""Of ramps."""
 POSITION, QUATERNION, OVER = slice(0, 3), slice(3, 7), 7
 """Values of a pose."""
 
@@ -33,9 +38,9 @@ POSITION, QUATERNION, OVER = slice(0, 3), slice(3, 7), 7
 class Acted(Protocol):
     """Object that inputs act on: a `Simulator`."""
 
-    def set_stimulus(self, channel: str, value: float | None, *, over: float) -> None: ...
+    def set_stimulus(self, channel: str, value: float | None, *, over: float, shape: str) -> None: ...
 
-    def set_load(self, name: str, factor: float | None, *, over: float) -> None: ...
+    def set_load(self, name: str, factor: float | None, *, over: float, shape: str) -> None: ...
 
     def set_pose(self, name: str, position: Values | None, quaternion: Values | None, *, over: float) -> None: ...
 
@@ -73,9 +78,9 @@ class Input:
         """
         match self.kind:
             case "stimulus":
-                simulator.set_stimulus(self.name, _given(self.values[0]), over=self._over)
+                simulator.set_stimulus(self.name, _given(self.values[0]), **self._ramp)
             case "load":
-                simulator.set_load(self.name, _given(self.values[0]), over=self._over)
+                simulator.set_load(self.name, _given(self.values[0]), **self._ramp)
             case "friction":
                 simulator.set_friction(_given(self.values[0]), self.name)
             case "pose":
@@ -88,9 +93,15 @@ class Input:
                 )
 
     @property
-    def _over(self) -> float:
-        """Time within which a stimulus or a load gets there [s]."""
-        return self.values[1] if len(self.values) > 1 else 0.0
+    def _ramp(self) -> dict[str, Any]:
+        """By what ramp a stimulus or a load gets there."""
+        over, smooth = (*self.values[1:], 0.0, 0.0)[:2]
+        return {"over": over, "shape": SMOOTH if smooth else LINEAR}
+
+
+def values_of_ramp(over: float, shape: str) -> tuple[float, ...]:
+    """Return the values of a ramp as it was requested, after the one that it leads to."""
+    return (float(over), 1.0) if shape == SMOOTH else (float(over),)
 
 
 def values_of_pose(position: Values | None, quaternion: Values | None, over: float) -> tuple[float, ...]:

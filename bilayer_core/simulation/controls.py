@@ -8,7 +8,19 @@ from collections.abc import Callable, Sequence
 from bilayer_core.errors import InputError
 from bilayer_core.model.override import acts, jump_to, ramp_to
 from bilayer_core.model.state import State
-from bilayer_core.observed.inputs import FRICTION, LOAD, POSE, STIMULUS, UNTIL, Input, values_of_pose
+from bilayer_core.observed.inputs import (
+    FRICTION,
+    LINEAR,
+    LOAD,
+    POSE,
+    SHAPES,
+    SMOOTH,
+    STIMULUS,
+    UNTIL,
+    Input,
+    values_of_pose,
+    values_of_ramp,
+)
 from bilayer_core.scene.channel_range import value_in_range
 from bilayer_core.simulation.friction_changes import change_friction
 from bilayer_core.simulation.poses import LEAST_TIME, new_goal
@@ -34,7 +46,7 @@ class Controls:
         self.listeners: list[Callable[[Input], None]] = []
         self._until = math.nan  # the last end of steps that listeners were told of [s]
 
-    def set_stimulus(self, channel: str, value: float | None, *, over: float = 0.0) -> None:
+    def set_stimulus(self, channel: str, value: float | None, *, over: float = 0.0, shape: str = LINEAR) -> None:
         """Set a channel from the next step on; see `Simulator.set_stimulus`."""
         scene = self._stepper.model.scene
         if channel not in scene.stimuli:
@@ -47,10 +59,10 @@ class Controls:
                 f"stimulus {channel!r}: {value} is not allowed; it must be from {allowed.minimum:g} "
                 f"to {allowed.maximum:g} (unit {allowed.unit})"
             )
-        self._override(list(scene.stimuli).index(channel), f"stimulus {channel!r}", accepted, over)
-        self.note(STIMULUS, channel, math.nan if accepted is None else accepted, float(over))
+        self._override(list(scene.stimuli).index(channel), f"stimulus {channel!r}", accepted, over, shape)
+        self.note(STIMULUS, channel, math.nan if accepted is None else accepted, *values_of_ramp(over, shape))
 
-    def set_load(self, name: str, factor: float | None, *, over: float = 0.0) -> None:
+    def set_load(self, name: str, factor: float | None, *, over: float = 0.0, shape: str = LINEAR) -> None:
         """Multiply a load by a factor from the next step on; see `Simulator.set_load`."""
         scene = self._stepper.model.scene
         names = [load.name for load in scene.loads]
@@ -59,9 +71,9 @@ class Controls:
             raise InputError(f"load {name!r}: no such load; the scene {scene.name!r} has: {known}")
         if factor is not None and not math.isfinite(factor):
             raise InputError(f"load {name!r}: a factor of {factor} is not allowed; it must be finite")
-        if self._override(len(scene.stimuli) + names.index(name), f"load {name!r}", factor, over):
+        if self._override(len(scene.stimuli) + names.index(name), f"load {name!r}", factor, over, shape):
             self._state.has_history.fill(0.0)  # accelerations jump with a load
-        self.note(LOAD, name, math.nan if factor is None else float(factor), float(over))
+        self.note(LOAD, name, math.nan if factor is None else float(factor), *values_of_ramp(over, shape))
 
     def set_friction(self, value: float | None, key: str = "coefficient") -> None:
         """Let a coefficient of friction jump from the next step on; see `Simulator.set_friction`."""
@@ -85,15 +97,17 @@ class Controls:
             self._state.has_history.fill(0.0)  # accelerations jump
         self.note(POSE, name, *values_of_pose(position, quaternion, over))
 
-    def _override(self, index: int, what: str, value: float | None, over: float) -> bool:
+    def _override(self, index: int, what: str, value: float | None, over: float, shape: str) -> bool:
         """Set a row of `State.override`; whether anything jumps."""
         if not (math.isfinite(over) and over >= 0.0):
             raise InputError(f"{what}: over = {over} is not allowed; it must be a number of seconds from 0 up")
+        if shape not in SHAPES:
+            raise InputError(f"{what}: shape = {shape!r} is not allowed; it must be one of {', '.join(SHAPES)}")
         if over > 0.0 and value is None:
             raise InputError(f"{what}: over = {over:g} s needs a value to get to; a schedule acts at once")
         row, present = self._state.override[index], self._stepper.surroundings.present(self._state, index)
         if value is not None and over > self._stepper.same_time:
-            row[:] = ramp_to(value, present, float(self._state.time[0]), over)
+            row[:] = ramp_to(value, present, float(self._state.time[0]), over, shape == SMOOTH)
             return False
         jumps = acts(row) if value is None else value != present
         if jumps:

@@ -227,6 +227,8 @@ class RunLoop:
     def _look_at_strips(self, steps: int, last: bool = False) -> None:
         """Look for strips that have folded, after so many more steps."""
         self._since_look += steps
+        if not len(self._stepper.model.flattening.joint):
+            return
         if not last and self._since_look < STEPS_TO_LOOK and self._stepper.reach(self._state) < self._strips_due:
             return
         self._since_look, self._looked = 0, self._time

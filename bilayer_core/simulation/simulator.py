@@ -26,7 +26,7 @@ from bilayer_core.model.plan import make_plan
 from bilayer_core.model.start_barrier import start_warnings
 from bilayer_core.model.state import State, initial_state, refuse_out_of_plane, turn_directors
 from bilayer_core.observed.frame import Description, Frame
-from bilayer_core.observed.inputs import RESET, Input
+from bilayer_core.observed.inputs import LINEAR, RESET, Input
 from bilayer_core.observed.observer import Observer
 from bilayer_core.printable import html_table
 from bilayer_core.scene.config import SceneConfig
@@ -380,7 +380,7 @@ class Simulator:
         self.compile()
         return make_frame(Capture(self._stepper, self._state), self.statistics, self.cpu_time)
 
-    def set_stimulus(self, channel: str, value: float | None, *, over: float = 0.0) -> None:
+    def set_stimulus(self, channel: str, value: float | None, *, over: float = 0.0, shape: str = LINEAR) -> None:
         """Set a channel from the next step on, in its unit.
 
         Parameters
@@ -390,16 +390,18 @@ class Simulator:
             None gives it back to the scene's schedule. A value that passes the range by rounding only, such as
             1.0000000000000002, is the end of the range.
         over : float
-            Simulated time in which it gets there, linearly, from what it is now [s]; 0 is a jump. Steps follow a ramp
-            without beginning again, also one that is replaced by another on its way: what comes often is cheaper so.
+            Simulated time in which it gets there from what it is now [s]; 0 is a jump. Steps follow a ramp without
+            beginning again, also one that is replaced by another on its way: what comes often is cheaper so.
+        shape : str
+            ``linear``; or ``smooth``, half a wave of a cosine, which begins and ends at rest and excites less.
 
         Raises
         ------
         InputError
             If there is no such channel, the value is not finite or out of the channel's range, or `over` is no time, or
-            given without a value; nothing is changed then.
+            given without a value, or there is no such shape; nothing is changed then.
         """
-        self._controls.set_stimulus(channel, value, over=over)
+        self._controls.set_stimulus(channel, value, over=over, shape=shape)
 
     def set_gains(self, gains: Mapping[str, Any]) -> None:
         """Give eigenstrains other gains, from the next step on; nothing is built anew.
@@ -441,7 +443,7 @@ class Simulator:
         self._state.has_history.fill(0.0)  # accelerations jump
         self._stepper.restart(self._state)
 
-    def set_load(self, name: str, factor: float | None, *, over: float = 0.0) -> None:
+    def set_load(self, name: str, factor: float | None, *, over: float = 0.0, shape: str = LINEAR) -> None:
         """Multiply force and moment of a load by a factor from the next step on.
 
         Parameters
@@ -449,16 +451,16 @@ class Simulator:
         name : str
         factor : float or None
             None gives it back to its schedule.
-        over : float
+        over, shape
             As in `set_stimulus`.
 
         Raises
         ------
         InputError
-            If there is no such load, the factor is not finite, or `over` is no time, or given without a factor; nothing
-            is changed then.
+            If there is no such load, the factor is not finite, or `over` is no time, or given without a factor, or
+            there is no such shape; nothing is changed then.
         """
-        self._controls.set_load(name, factor, over=over)
+        self._controls.set_load(name, factor, over=over, shape=shape)
 
     def set_friction(self, value: float | None, key: str = "coefficient") -> None:
         """Let a coefficient of friction jump to a value, from the next step on.

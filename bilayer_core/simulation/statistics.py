@@ -129,15 +129,13 @@ class RunStatistics:
 
     def _take_extrema(self, stepper: Stepper) -> None:
         extrema, model = stepper.engine.extrema, stepper.model
-        self.com_max_height, self.min_gap, self.max_contact_force = (
-            extrema.height,
-            extrema.least_gap,
-            extrema.contact_force,
-        )
-        self.max_curvature, self.max_strain = extrema.curvature, extrema.strain
-        self.max_fibre_strain, self.max_curvature_by_thickness = extrema.fibre_strain, extrema.curvature_by_thickness
-        self.bent_plate = extrema.bent_plate, extrema.most_bent
-        self.put_in, self.taken_out = extrema.put_in, extrema.taken_out
+        found = stepper.engine.numbers_of_extrema.read()
+        self.com_max_height, self.min_gap = found["height"], found["least_gap"]
+        self.max_contact_force = found["contact_force"]
+        self.max_curvature, self.max_strain = found["curvature"], found["strain"]
+        self.max_fibre_strain, self.max_curvature_by_thickness = found["fibre_strain"], found["curvature_by_thickness"]
+        self.bent_plate = found["bent_plate"], found["most_bent"]
+        self.put_in, self.taken_out = found["put_in"], found["taken_out"]
         self.body_tops = dict(zip(model.bodies.names, extrema.body_top.tolist(), strict=True))
         if not model.has_surface_contact:
             return

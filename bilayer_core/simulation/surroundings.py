@@ -64,7 +64,8 @@ class Surroundings:
 
     def present(self, state: State, index: int) -> float:
         """Return the value of a channel or the factor of a load in a state; loads are numbered after channels."""
-        return float(np.concatenate([self.stimulus_at(state, float(state.time[0])), self.load_factor(state)])[index])
+        row, time = state.override[index].tolist(), float(state.time[0])
+        return value_at(row, time) if acts(row) else [*self._channels, *self._loads][index].value(time)
 
     def cover(self, time: float, override: Array, pose_goal: Array) -> None:
         """Let `actuation` hold what acts from `time` [s] on, and a little before, where something may jump.

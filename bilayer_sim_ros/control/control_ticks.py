@@ -3,8 +3,8 @@
 Whoever advances time, freely, step by step while paused or in lockstep, comes by here at each step: at the first that
 begins at a tick or after it, what has come since the tick before is set on the simulator, the last message of each
 channel and load. By ``linear`` each is reached one control period later, as a ramp that ends at the next tick, so that
-commands which come often are one broken line, and steps never begin again. By ``hold`` it jumps. The simulator tells
-the log: what acts is what is logged.
+commands which come often are one broken line, and steps never begin again; by ``smooth`` likewise, by a ramp that rests
+at each tick. By ``hold`` it jumps. The simulator tells the log: what acts is what is logged.
 """
 
 from __future__ import annotations
@@ -12,17 +12,18 @@ from __future__ import annotations
 import math
 
 from bilayer_core.errors import InputError
+from bilayer_core.observed.inputs import LINEAR, SHAPES
 from bilayer_core.simulation.observers import TIME_ROUNDING
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_sim_ros.control.lockstep import Lockstep
-from bilayer_sim_ros.control.pending_changes import Commands
+from bilayer_sim_ros.control.pending_changes import Commands, Ramp
 from bilayer_sim_ros.control.periods import Periods
 from bilayer_sim_ros.control.stimulus import StimulusInputs
 
 SHORTEST_PERIOD = 1e-6
 """Shortest control period where steps are adaptive [s]; /clock counts nanoseconds."""
-LINEAR, HOLD = "linear", "hold"
-INTERPOLATIONS = (LINEAR, HOLD)
+HOLD = "hold"
+INTERPOLATIONS = (*SHAPES, HOLD)
 
 
 class Control:
@@ -37,7 +38,7 @@ class Control:
     rate : float
         Ticks per simulated second [Hz].
     interpolation : str
-        ``linear`` or ``hold``.
+        One of `INTERPOLATIONS`.
     lockstep : Lockstep, optional
         Waits at ticks; without one nobody does, and steps end at ticks from the first command on.
     """
@@ -52,7 +53,7 @@ class Control:
     ):
         self._inputs, self._commands = inputs, commands
         self._ticks = Periods(rate)
-        self._linear = interpolation == LINEAR
+        self._interpolation = interpolation
         self._lockstep = lockstep
         self._count = 0
         self._open = self._commanded = self._stands = False
@@ -96,11 +97,13 @@ class Control:
             return
         self._open = False
         time = simulator.time
-        over = self._ticks.time_to_nearest_end(time) if self._linear else 0.0
+        ramp: Ramp = {}
+        if self._interpolation != HOLD:
+            ramp = {"over": self._ticks.time_to_nearest_end(time), "shape": self._interpolation}
         for name, value in self._inputs.changes(time).items():
             ramps = value is not None and name in self._inputs.heard
-            simulator.set_stimulus(name, value, over=over if ramps else 0.0)
-        applied = self._commands.apply(simulator, over)
+            simulator.set_stimulus(name, value, **(ramp if ramps else {}))
+        applied = self._commands.apply(simulator, ramp)
         self._commanded = self._commanded or applied or bool(self._inputs.heard)
 
     def next_stop(self, time: float) -> float:

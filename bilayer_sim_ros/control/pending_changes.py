@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Sequence
+from typing import TypedDict
 
 from geometry_msgs.msg import Pose, PoseStamped
 
@@ -14,6 +15,13 @@ from bilayer_core.simulation.simulator import Simulator
 FRAMES = ("", "world")
 """Frames in which a pose may be given."""
 POSE = "pose"
+
+
+class Ramp(TypedDict, total=False):
+    """How a stimulus or a load gets to its value; see `Simulator.set_stimulus`. Empty: it jumps."""
+
+    over: float
+    shape: str
 
 
 class Commands:
@@ -33,9 +41,9 @@ class Commands:
     def __init__(self, refuse: Callable[[str], None]):
         self._refuse = refuse
         self._lock = threading.Lock()
-        self._waiting: dict[tuple[str, str], Callable[[Simulator, float], None]] = {}
+        self._waiting: dict[tuple[str, str], Callable[[Simulator, Ramp], None]] = {}
         self.forgotten: Callable[[], None] = lambda: None
-        self._first: dict[tuple[str, str], Callable[[Simulator, float], None]] = {}
+        self._first: dict[tuple[str, str], Callable[[Simulator, Ramp], None]] = {}
         self._begun = False
 
     def reset(self, keep_first: bool = False) -> None:
@@ -55,15 +63,15 @@ class Commands:
 
     def ask_load(self, name: str, factor: float) -> None:
         """Let a load act with a factor."""
-        self.ask(("load", name), lambda simulator, over: simulator.set_load(name, factor, over=over))
+        self.ask(("load", name), lambda simulator, ramp: simulator.set_load(name, factor, **ramp))
 
-    def ask(self, key: tuple[str, str], action: Callable[[Simulator, float], None]) -> None:
+    def ask(self, key: tuple[str, str], action: Callable[[Simulator, Ramp], None]) -> None:
         """Ask for something to be done at the next tick, instead of what waits under the same key."""
         with self._lock:
             self._waiting[key] = action
 
-    def apply(self, simulator: Simulator, over: float) -> bool:
-        """Let what waits act from now on, loads within a time [s]; poses have limits of their own.
+    def apply(self, simulator: Simulator, ramp: Ramp) -> bool:
+        """Let what waits act from now on, loads by a ramp; poses have limits of their own.
 
         Returns
         -------
@@ -78,7 +86,7 @@ class Commands:
             self._begun, self._first = True, {key: action for key, action in waiting.items() if key[0] == POSE}
         for key in sorted(waiting):  # whichever came first
             try:
-                waiting[key](simulator, over)
+                waiting[key](simulator, ramp)
             except InputError as error:
                 self._refuse(str(error))
         return bool(waiting)

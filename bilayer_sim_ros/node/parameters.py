@@ -157,8 +157,9 @@ SIM_NODE = (
     NodeParameter(
         "stimulus_interpolation",
         "linear",
-        "how a stimulus or a load gets to its new value: linear (at the end of the control period), or hold (it jumps)",
-        choices=("linear", "hold"),
+        "how a stimulus or a load gets to its new value: linear, or smooth (at the end of the control period; it rests "
+        "there), or hold (it jumps)",
+        choices=("linear", "smooth", "hold"),
     ),
     NodeParameter(
         "control_period",

@@ -10,8 +10,10 @@ from PIL import Image
 
 from bilayer_core.cli import main
 from bilayer_core.model.plan import MODELS
+from bilayer_core.observed.inputs import SHAPES
 from bilayer_core.verification.bench import (
     cantilever,
+    commands,
     converged_answers,
     machine,
     measuring,
@@ -170,3 +172,18 @@ def test_the_machine_is_recorded_with_versions():
     record = machine.record()
     assert record["cpu"] and record["versions"]["numpy"]
     assert machine.installed_version("no-such-distribution") is None
+
+
+def test_actions_of_a_controller_are_counted_beside_their_errors(tmp_path, monkeypatch):
+    monkeypatch.setattr(commands, "QUICK_SCENE", "bending")
+    monkeypatch.setattr(commands, "ACTIONS", 4)
+    assert main(["bench", "--quick", "--quiet", "--out", str(tmp_path), "--only", "commands"]) == 0
+    records = json.loads((tmp_path / "bench.json").read_text())["commands"]
+    found = {(r["shape"], r["integrator"], r["tolerance_factor"]): r for r in records}
+    assert list(found) == [(shape, *choice) for shape in SHAPES for choice in commands.CHOICES]
+    for shape in SHAPES:
+        small, large = (found[shape, "sdirk2", factor]["error"] for factor in (1.0, 5.0))
+        assert 0.0 < small < large < 0.01
+    assert all(record["actions_per_second"] > 0.0 for record in records)
+    page = (tmp_path / "bench.md").read_text().split("## Actions of a controller")[1]
+    assert sum(line.startswith("| bending | ") for line in page.splitlines()) == len(records)

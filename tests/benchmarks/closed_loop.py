@@ -216,7 +216,7 @@ def main() -> None:
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="of the scene")
     parser.add_argument("--factor", type=float, default=0.0, help="real-time factor asked for; 0 = as fast as possible")
     parser.add_argument("--duration", type=float, default=10.0, help="simulated time [s]")
-    parser.add_argument("--interpolation", default="linear", choices=["linear", "hold"])
+    parser.add_argument("--interpolation", default="linear", choices=["linear", "smooth", "hold"])
     parser.add_argument("--tolerance", type=float, default=0.0, help="of steps; 0 = as the scene says")
     parser.add_argument("--no-error", action="store_true")
     parser.add_argument("--part", type=float, default=0.1, help="of the tolerance, for the error")

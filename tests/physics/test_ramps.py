@@ -7,6 +7,7 @@ from support.sample_scenes import everything
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError
 from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.observed.inputs import SHAPES
 from bilayer_core.runs.replay import verify
 
 CORNERS = (0.0, 0.04, 0.1, 0.16, 0.2)
@@ -43,6 +44,29 @@ def test_a_ramp_from_outside_is_the_same_ramp_of_a_schedule(settings):
     assert driven.statistics.substeps == scheduled.statistics.substeps
 
 
+def test_a_smooth_ramp_is_half_a_wave_that_rests_at_both_ends():
+    driven = bender()
+    driven.set_stimulus("swelling", 0.2)
+    driven.set_stimulus("swelling", 0.8, over=0.1, shape="smooth")
+    reached = {}
+    for part in (0.01, 0.25, 0.5, 0.75, 0.99, 1.2):
+        driven.run(until=0.1 * part)
+        reached[part] = driven.stimulus["swelling"]
+    expected = [0.5 - 0.3 * np.cos(np.pi * min(part, 1.0)) for part in reached]
+    np.testing.assert_allclose(list(reached.values()), expected, rtol=1e-12)
+
+
+def test_smooth_ramps_of_the_same_commands_take_fewer_steps():
+    counts = {}
+    for shape in SHAPES:
+        driven, chance = Simulator(load_scene("gripping")), np.random.default_rng(2)
+        for _ in range(5):
+            driven.set_stimulus("humidity", 0.3 * chance.random(), over=0.04, shape=shape)
+            driven.run(0.04)
+        counts[shape] = driven.statistics.substeps
+    assert counts["smooth"] < 0.8 * counts["linear"]
+
+
 def test_a_ramp_that_is_replaced_goes_on_from_where_it_is():
     driven = bender()
     driven.set_stimulus("swelling", 1.0, over=0.1)
@@ -66,9 +90,10 @@ def test_ramps_that_come_often_do_not_make_steps_short():
     assert counts[0.02] < 0.5 * counts[0.0]
 
 
-def test_a_saved_state_goes_on_with_its_ramp_bit_for_bit():
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_saved_state_goes_on_with_its_ramp_bit_for_bit(shape):
     driven = bender()
-    driven.set_stimulus("swelling", 1.0, over=0.1)
+    driven.set_stimulus("swelling", 1.0, over=0.1, shape=shape)
     driven.run(until=0.06)
     saved = driven.save_state()
     driven.run(until=0.16)
@@ -78,16 +103,18 @@ def test_a_saved_state_goes_on_with_its_ramp_bit_for_bit():
     np.testing.assert_array_equal(other.save_state(), driven.save_state())
 
 
-def test_a_log_of_ramps_is_made_again_bit_for_bit(tmp_path):
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_log_of_ramps_is_made_again_bit_for_bit(tmp_path, shape):
     simulator = Simulator(load_scene(everything()))
-    simulator.set_stimulus("humidity", 0.8, over=0.03)
+    simulator.set_stimulus("humidity", 0.8, over=0.03, shape=shape)
+    simulator.set_load(simulator.scene.loads[0].name, 2.0, over=0.03, shape=shape)
     simulator.run(0.05, observers=[McapRecorder(tmp_path / "run.mcap")])
     driven = bender()
     times = iter(range(1000))
 
     def act(_):
         if next(times) % 5 == 0:
-            driven.set_stimulus("swelling", 0.5 + 0.5 * np.sin(40.0 * driven.time), over=0.013)
+            driven.set_stimulus("swelling", 0.5 + 0.5 * np.sin(40.0 * driven.time), over=0.013, shape=shape)
 
     driven.run(until=0.2, observers=[McapRecorder(tmp_path / "bender.mcap")], each_step=act)
     for name in ("run", "bender"):
@@ -101,7 +128,7 @@ def test_loads_may_be_set_by_ramps():
     simulator.set_load(load, 3.0, over=0.02)
     simulator.run(until=0.01)
     row = simulator._state.override[len(simulator.scene.stimuli)]
-    assert row.tolist() == [3.0, row[1], 0.0, 0.02]
+    assert row.tolist() == [3.0, row[1], 0.0, 0.02, 0.0]
     simulator.run(until=0.03)
     assert simulator._stepper.surroundings.load_factor(simulator._state)[0] == 3.0
 
@@ -123,6 +150,11 @@ def test_a_ramp_that_cannot_be_is_refused_and_changes_nothing(value, over, fault
     with pytest.raises(InputError, match=fault):
         driven.set_stimulus("swelling", value, over=over)
     np.testing.assert_array_equal(driven.save_state(), before)
+
+
+def test_a_ramp_of_no_known_shape_is_refused():
+    with pytest.raises(InputError, match="shape = 'cubic' is not allowed; it must be one of linear, smooth"):
+        bender().set_stimulus("swelling", 0.5, over=0.1, shape="cubic")
 
 
 @pytest.mark.parametrize(("value", "end"), [(1.0000000000000002, 1.0), (-1e-17, 0.0), (1.0 + 5e-10, 1.0)])

@@ -72,6 +72,15 @@ def test_linear_reaches_a_command_one_period_after_its_tick():
     assert driven.stimuli == [(0.0, 0.0, 0.0), (0.1, 0.6, pytest.approx(PERIOD))]
 
 
+def test_smooth_reaches_a_command_by_half_a_wave():
+    driven = Driven(interpolation="smooth").run(0.1)
+    driven.inputs.receive(CHANNEL, 0.6)
+    driven.run(0.11)
+    part = (driven.simulator.time - 0.1) / PERIOD
+    assert driven.simulator.stimulus[CHANNEL] == pytest.approx(0.3 - 0.3 * math.cos(math.pi * part))
+    assert driven.stimuli[-1] == (0.1, 0.6, pytest.approx(PERIOD), 1.0)
+
+
 def test_hold_jumps_at_the_tick():
     driven = Driven(interpolation="hold").run(0.1)
     driven.inputs.receive(CHANNEL, 0.6)

@@ -26,7 +26,7 @@ class Simulated:
         self.time = time
         self.set = []
 
-    def set_stimulus(self, channel, value, *, over):
+    def set_stimulus(self, channel, value, *, over=0.0, shape="linear"):
         self.set.append((channel, value, pytest.approx(over)))
 
 
@@ -203,11 +203,11 @@ def test_a_pose_that_acted_at_the_start_acts_again_where_nobody_heard_of_a_later
     moved, commands = [], Commands(pytest.fail)
     commands.ask((POSE, "hub"), lambda simulator, over: moved.append("pose"))
     commands.ask(("load", "push"), lambda simulator, over: moved.append("load"))
-    assert commands.apply(None, 0.0) and sorted(moved) == ["load", "pose"]
+    assert commands.apply(None, {}) and sorted(moved) == ["load", "pose"]
     commands.reset(keep_first=True)
-    assert commands.apply(None, 0.0) and sorted(moved) == ["load", "pose", "pose"]
+    assert commands.apply(None, {}) and sorted(moved) == ["load", "pose", "pose"]
     commands.reset()
-    assert not commands.apply(None, 0.0) and len(moved) == 3
+    assert not commands.apply(None, {}) and len(moved) == 3
 
 
 @pytest.mark.parametrize(

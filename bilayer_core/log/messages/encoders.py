@@ -16,7 +16,7 @@ from bilayer_core.log.messages.node_frames import NodeFrames
 from bilayer_core.log.messages.tf_frames import TfEncoder
 from bilayer_core.log.messages.topics import CONTACT_PAIRS, FRAME_ID, JOINTS, MARKERS, SECTION_POINTS, TF, output_topics
 from bilayer_core.observed.frame import Description, Frame
-from bilayer_core.observed.inputs import LOAD, SIZES, STIMULUS, Input
+from bilayer_core.observed.inputs import OPTIONAL, SIZES, Input
 from bilayer_core.printable import shortened
 
 POINT_FIELDS = ("x", "y", "z", "strain", "curvature", "fx", "fy", "fz")
@@ -123,7 +123,7 @@ def decode_input(data: bytes) -> Input:
     (_, _, label), values = read_float64_multi_array(data)
     kind, _, name = label.partition(":")
     given = values[2:].tolist()
-    if kind not in SIZES or not SIZES[kind] - (kind in (STIMULUS, LOAD)) <= len(given) <= SIZES[kind]:
+    if kind not in SIZES or not SIZES[kind] - OPTIONAL.get(kind, 0) <= len(given) <= SIZES[kind]:
         raise ValueError(f"an input {shortened(kind)!r} with {len(given)} values is not known")
     return Input(int(values[0]), float(values[1]), kind, name, tuple(given))
 

@@ -10,7 +10,7 @@ from bilayer_core.log.file.output_paths import write_text
 from bilayer_core.verification.bench import machine
 
 SCHEMA = 1
-PARTS = ("work_precision", "cantilever", "scaling", "start")
+PARTS = ("work_precision", "cantilever", "scaling", "start", "commands")
 """Each a list of records in the file."""
 FILE_NAME = "bench.json"
 

@@ -7,16 +7,16 @@ from pathlib import Path
 
 from bilayer_core.errors import InputError
 from bilayer_core.scene.faults import suggestion
-from bilayer_core.verification.bench import cantilever, plots, scaling, start, tables, work_precision
+from bilayer_core.verification.bench import cantilever, commands, plots, scaling, start, tables, work_precision
 from bilayer_core.verification.bench.problems import PROBLEMS, Problem
 from bilayer_core.verification.bench.results import Results
 
-PEERS, SCALING, START = "peers", "scaling", "start"
+PEERS, SCALING, START, COMMANDS = "peers", "scaling", "start", "commands"
 
 
 def names() -> list[str]:
     """Return all that ``--only`` takes."""
-    return [*(problem.name for problem in PROBLEMS), PEERS, SCALING, START]
+    return [*(problem.name for problem in PROBLEMS), PEERS, SCALING, START, COMMANDS]
 
 
 def chosen_names(only: Sequence[str], quick: bool) -> list[str]:
@@ -47,7 +47,8 @@ def count(chosen: Sequence[str], quick: bool) -> int:
     total = len(work_precision.plan(chosen_problems(chosen), quick))
     total += len(cantilever.PEERS) * (PEERS in chosen)
     total += len(scaling.plan(quick)) * (SCALING in chosen)
-    return total + len(start.plan(quick)) * (START in chosen)
+    total += len(start.plan(quick)) * (START in chosen)
+    return total + len(commands.plan(quick)) * (COMMANDS in chosen)
 
 
 def measure(chosen: Sequence[str], results: Results, quick: bool, progress: Callable[[str], None]) -> list[str]:
@@ -71,6 +72,8 @@ def measure(chosen: Sequence[str], results: Results, quick: bool, progress: Call
         scaling.measure(results, quick, progress)
     if START in chosen:
         start.measure(results, quick, progress)
+    if COMMANDS in chosen:
+        commands.measure(results, quick, progress)
     return skipped
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from bilayer_core.log.file.output_paths import write_text
 from bilayer_core.model.plan import RECOMMENDED, make_plan
-from bilayer_core.verification.bench import cantilever, pareto, scaling, start, work_precision
+from bilayer_core.verification.bench import cantilever, commands, pareto, scaling, start, work_precision
 from bilayer_core.verification.bench.configurations import Family
 from bilayer_core.verification.bench.converged_answers import read_file, sharp
 from bilayer_core.verification.bench.problems import PROBLEMS
@@ -48,6 +48,7 @@ def page(content: dict) -> str:
         *_section("References", references_table(content), compared),
         *_section("CPU time of a step against nodes", scaling_table(content), bool(content[scaling.PART])),
         *_section("First step of a new process", start_table(content), bool(content[start.PART])),
+        *_section("Actions of a controller", commands_table(content), bool(content[commands.PART])),
     ]
     return "\n".join(parts) + "\n"
 
@@ -193,6 +194,23 @@ def start_table(content: dict) -> list[str]:
     ]
     head = [f"{kind}: {what} [s]" for kind in ("cold", "warm") for what in ("CPU", "wall", "of that kernels, CPU")]
     return _table(["scene", "model", *head], rows)
+
+
+def commands_table(content: dict) -> list[str]:
+    """Return actions per CPU second and errors [mm], by scene, shape of ramps, integrator and tolerance."""
+    rows = [
+        [
+            record["scene"],
+            record["shape"],
+            record["integrator"],
+            f"{record['tolerance_factor']:g}",
+            f"{record['actions_per_second']:.3g}",
+            f"{1e3 * record['error']:.2g}",
+        ]
+        for record in content[commands.PART]
+    ]
+    head = ["scene", "ramps", "integrator", "tolerance over the scene's", "actions per CPU second", "rms error [mm]"]
+    return _table(head, rows)
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
