@@ -5,14 +5,14 @@ stimulus u and without sources,
 
     q′ = −γ u′ − K(a) q,    K_mn(a) = ∫ S D(a) v_m′ v_n′ dz + Σ h S v_m v_n at faces with exchange
 
-The integral is a sum over Gauss points. A step with K held at its start,
+The integral is a sum over Gauss points. Steps of h with K₀ = K(a₀), held where all of them begin,
 
-    (1 + h K(a₀)) q₁ = q₀ − h γ u′,
+    (1 + h K₀) (q₁ − q₀) = h q′(q₀),
 
-damps fast modes whatever h. Its error is a series in h, so steps of h and h/2 are extrapolated (Aitken and Neville), to
-third order with h/3 where that is not enough; the last two values tell the error, by which h is chosen. Steps of a
-mechanism are short beside diffusion, so that two are mostly enough. The same values give the same steps, so runs that
-are continued or replayed stay the same bit for bit. States keep y, as for any field.
+damp fast modes while K is below 2 K₀. Their error is a series in h, so steps of h and h/2 are extrapolated (Aitken and
+Neville), to third order with h/3 where that is not enough; the last two values tell the error, by which h is chosen.
+Steps of a mechanism are short beside diffusion, so that two are mostly enough. The same values give the same steps, so
+runs that are continued or replayed stay the same bit for bit. States keep y, as for any field.
 """
 
 from __future__ import annotations
@@ -65,16 +65,14 @@ def _hold(varied, own, size, u, q):
 
 
 @kernel
-def _step(varied, size, push, h, amplitude, q):
-    """Make a step of length h [s] with K as it is held, while the stimulus changes by `push` a second, in place."""
+def _factorise(varied, size, h):
+    """Write Cholesky's factor of 1 + h K, with K as it is held, to the lower triangle of `matrix`."""
     matrix, diagonal = varied.matrix, varied.level[LEVELS - 1]
     for i in range(size):
         for j in range(i):
             matrix[i, j] = h * matrix[j, i]
         matrix[i, i] = 1.0 + h * diagonal[i]
-    for i in range(size):
-        q[i] -= h * push * varied.amplitude[amplitude + i]
-    for j in range(size):  # Cholesky, and both triangles
+    for j in range(size):
         for k in range(j):
             matrix[j, j] -= matrix[j, k] * matrix[j, k]
         matrix[j, j] = math.sqrt(matrix[j, j])
@@ -82,33 +80,63 @@ def _step(varied, size, push, h, amplitude, q):
             for k in range(j):
                 matrix[i, j] -= matrix[i, k] * matrix[j, k]
             matrix[i, j] /= matrix[j, j]
-    for i in range(size):
-        for k in range(i):
-            q[i] -= matrix[i, k] * q[k]
-        q[i] /= matrix[i, i]
-    for n in range(size):
-        i = size - 1 - n
-        for k in range(i + 1, size):
-            q[i] -= matrix[k, i] * q[k]
-        q[i] /= matrix[i, i]
 
 
 @kernel
-def _extrapolate(varied, own, size, u, push, h, amplitude):
+def _change(varied, own, size, u, push, q, begin, change_out):
+    """Write q′ = −γ u′ − K(a) q from `begin` on."""
+    entry, square = varied.entry[own], varied.square[own]
+    for i in range(size):
+        flow = push * varied.amplitude[begin + i]
+        for j in range(size):
+            flow += varied.exchange[square + i * size + j] * q[j]
+        change_out[begin + i] = -flow
+    for g in range(varied.point[own], varied.point[own + 1]):
+        at = entry + (g - varied.point[own]) * size
+        a, slope = u, 0.0
+        for i in range(size):
+            a += varied.value[at + i] * q[i]
+            slope += varied.slope[at + i] * q[i]
+        flux = varied.weight[g] * _diffusivity(varied, g, a) * slope
+        for i in range(size):
+            change_out[begin + i] -= flux * varied.slope[at + i]
+
+
+@kernel
+def _step(varied, size, h, q, begin, change):
+    """Add (1 + h K)⁻¹ h q′ to q, by the factor at hand; `change` is q′ from `begin` on, and scratch then."""
+    matrix = varied.matrix
+    for i in range(size):
+        part = h * change[begin + i]
+        for k in range(i):
+            part -= matrix[i, k] * change[begin + k]
+        change[begin + i] = part / matrix[i, i]
+    for n in range(size):
+        i = size - 1 - n
+        part = change[begin + i]
+        for k in range(i + 1, size):
+            part -= matrix[k, i] * change[begin + k]
+        change[begin + i] = part / matrix[i, i]
+        q[i] += change[begin + i]
+
+
+@kernel
+def _extrapolate(varied, own, size, u, push, h, begin, scratch):
     """Write q after a step of length h [s] to `moved`; its error, the root mean square over the thickness, in parts of
-    what is allowed, and its order.
+    what is allowed, and its order. `scratch` is written from `begin` on, where the field's modes are.
     """
     level, q = varied.level, varied.moved
     whole = 0.0
     for i in range(size):
-        whole += varied.amplitude[amplitude + i] ** 2
+        whole += varied.amplitude[begin + i] ** 2
+    _hold(varied, own, size, u, varied.present)
     for n in range(LEVELS):
         copy(varied.present, q)
         part, square = h / (n + 1), 0.0
+        _factorise(varied, size, part)
         for k in range(n + 1):
-            if k > 0 or n != 1:  # two parts begin where one does
-                _hold(varied, own, size, u + push * (k * part), q)
-            _step(varied, size, push, part, amplitude, q)
+            _change(varied, own, size, u + push * (k * part), push, q, begin, scratch)
+            _step(varied, size, part, q, begin, scratch)
         for i in range(size):
             better = q[i]  # level[k, i] is that of n parts, extrapolated k times
             for k in range(n):
@@ -147,7 +175,7 @@ def diffuse(varied, drives, f, reached, first, last, dt, reached_out):
         varied.present[i] = varied.amplitude[begin + i] * (reached[begin + i] - first)
     while time < dt:
         h = min(h, dt - time)
-        error, order = _extrapolate(varied, own, size, first + push * time, push, h, begin)
+        error, order = _extrapolate(varied, own, size, first + push * time, push, h, begin, reached_out)
         factor = LARGEST_FACTOR if error == 0.0 else SAFETY * error ** (-1.0 / order)
         if error <= 1.0 or h <= SHORTEST * dt:
             time = dt if h == dt - time else time + h
