@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bilayer_core.simulation.gradient import Equilibrium
+from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
 from bilayer_core.simulation.simulator import Simulator
 
 

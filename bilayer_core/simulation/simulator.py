@@ -37,7 +37,8 @@ from bilayer_core.simulation.energy_budget import EnergyLedger
 from bilayer_core.simulation.equilibrium import StaticReport, solve_static
 from bilayer_core.simulation.friction_changes import coefficients
 from bilayer_core.simulation.gains import alike_but_gains, put_gains
-from bilayer_core.simulation.gradient import Equilibrium, Gradient, differentiate
+from bilayer_core.simulation.gradients.derivatives import Gradient, differentiate
+from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
 from bilayer_core.simulation.momentum import angular_momentum_of, momentum_of
 from bilayer_core.simulation.observation import (
     describe,
@@ -686,7 +687,7 @@ class Simulator:
                 self._loop.take_state()
 
     def gradient(self, of: str | Sequence[str], to: str | Sequence[str]) -> Gradient:
-        """Return derivatives of the equilibrium at which the robot is; see `simulation.gradient`.
+        """Return derivatives of the equilibrium at which the robot is; see `simulation.gradients`.
 
         Parameters
         ----------
