@@ -27,7 +27,7 @@ from bilayer_core.model.contact_points import contact_point_names
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.contacts import RodContact, Surfaces
 from bilayer_core.model.records.parts import Mechanisms
-from bilayer_core.model.records.problem import Sums
+from bilayer_core.model.records.problem import Problem, Sums
 from bilayer_core.model.records.step import RunExtrema, StageInputs, StateArrays
 from bilayer_core.model.state import State
 
@@ -64,6 +64,8 @@ class Engine:
         Of the run.
     passes : int
         Of Newton's method, in the last steps.
+    methods : list of Method
+        The integrator's coefficients, and last those of what stands in for one with a history.
     """
 
     def __init__(
@@ -74,7 +76,7 @@ class Engine:
         self._newton = newton_tolerance, max_iterations
         self._outcome, self.gap, self.passes = self._storage.outcome, math.inf, 0
         methods = (method, SELF_STARTING) if method.history else (method,)
-        self._methods = [used.arrays() for used in methods]
+        self.methods = [used.arrays() for used in methods]
         self._configurations = [new_configuration(model, sizes) for _ in range(3)]
         self.end = self._configurations[1]
         self._work = new_work(sizes, self._configurations, max(len(used.nodes) for used in methods))
@@ -160,7 +162,7 @@ class Engine:
         problem, parts = self._storage.problem, self._integration
         known = parts is not None and parts.problem is problem and parts.actuation is self.actuation
         if not known or state is not self._state:
-            methods, start_state = self._methods, state.copy()
+            methods, start_state = self.methods, state.copy()
             arrays, start_arrays = (
                 StateArrays(**{name: getattr(of, name) for name in StateArrays.names}) for of in (state, start_state)
             )
@@ -201,6 +203,11 @@ class Engine:
             return self._storage.grow(status)
         except CapacityError as refusal:
             raise SimulationError(refusal.reason, float(state.time[0]), refusal.remedy) from None
+
+    @property
+    def problem(self) -> Problem:
+        """All records of forces."""
+        return self._storage.problem
 
     @property
     def sums(self) -> Sums:
@@ -244,6 +251,11 @@ class Engine:
     def moved(self) -> float:
         """Largest displacement of a material point in the last round of statics [m]."""
         return float(self._work.moved[0])
+
+    @property
+    def stood_in(self) -> bool:
+        """Whether the last steps were made by what stands in for a method with a history."""
+        return self._counts.restarts > 0
 
     @property
     def unstable(self) -> int:

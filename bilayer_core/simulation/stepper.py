@@ -89,6 +89,8 @@ class Stepper:
     Attributes
     ----------
     surroundings : Surroundings
+    ahead : float
+        By which these reach beyond the present, at least [s].
     same_time : float
         Two times that differ by no more are one [s].
     ledger : EnergyLedger or None
@@ -121,7 +123,8 @@ class Stepper:
         rounding = TIME_ROUNDING if steps.adaptive else FIXED_ROUNDING
         self.same_time = max(first * rounding, LAST_DIGITS * model.scene.duration)
         self._first, self._longest = first, steps.longest if steps.adaptive else steps.dt
-        self.surroundings = Surroundings(model, ahead=2.0 * first)
+        self.ahead = 2.0 * first
+        self.surroundings = Surroundings(model, self.ahead)
         return StepControl(
             dt=0.0 if steps.adaptive else steps.dt,
             order=method.order,

@@ -17,7 +17,7 @@ differentiated along the same path, whatever they depend on.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,10 +27,17 @@ from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.model.model import Model
 from bilayer_core.model.state import State
 from bilayer_core.observed.frame import Description
-from bilayer_core.scene.config import SceneConfig
 from bilayer_core.simulation.equilibrium import solve_static
 from bilayer_core.simulation.gains import put_gains
-from bilayer_core.simulation.gradients.nearby import PLACES, Motion, Nearby, slope
+from bilayer_core.simulation.gradients.nearby import (
+    PLACES,
+    Builders,
+    Motion,
+    Nearby,
+    carry_directors,
+    known_quantities,
+    slope,
+)
 from bilayer_core.simulation.gradients.parameters import (
     STEP,
     Parameter,
@@ -86,8 +93,7 @@ class Equilibrium:
     stepper : Stepper
     state : State
         Near rest; it is left as it is.
-    model_of, stepper_of, state_of : callable
-        Make the model of a scene, and the stepper and the first state of a model.
+    builders : Builders
     description : Description
         Of a run of the stepper's model.
 
@@ -108,18 +114,16 @@ class Equilibrium:
         self,
         stepper: Stepper,
         state: State,
-        model_of: Callable[[SceneConfig], Model],
-        stepper_of: Callable[[Model], Stepper],
-        state_of: Callable[[Model], State],
+        builders: Builders,
         description: Description,
     ):
-        model, self._description = stepper.model, description
-        self._model_of, self._stepper_of, self._state_of, self._start = model_of, stepper_of, state_of, state_of(model)
+        model, self._description, self._builders = stepper.model, description, builders
+        self._start = builders.state_of(model)
         self.scene, self._size = model.scene, max(rod.path.length for rod in model.scene.rods)
         self._gains = model.drives.law_gain.copy()
         arrays = {name: getattr(model.drives, name) for name in model.drives.names}
         self.model = replace(model, drives=type(model.drives)(**arrays | {"law_gain": self._gains.copy()}))
-        self._stepper, self._evaluator = stepper_of(self.model), Evaluator(self.model)
+        self._stepper, self._evaluator = builders.stepper_of(self.model), Evaluator(self.model)
         self._state = state.copy()
         for part in RATES:
             getattr(self._state, part).fill(0.0)
@@ -147,6 +151,11 @@ class Equilibrium:
         self._farthest = min(STEP * self._size, OF_GAP * self._evaluator.gap)
 
     @property
+    def known(self) -> Collection[str]:
+        """Names of quantities that may be differentiated."""
+        return known_quantities(self._stepper, self._state, self._description)
+
+    @property
     def positions(self) -> Array:
         """Positions of nodes [m], shape (n_node, 3)."""
         return self._state.position
@@ -158,7 +167,9 @@ class Equilibrium:
 
     def fits(self, model: Model) -> bool:
         """Return whether states of a model have the same unknowns."""
-        return model.layout.size == self.model.layout.size and _shapes(self._state_of(model)) == _shapes(self._state)
+        return model.layout.size == self.model.layout.size and _shapes(self._builders.state_of(model)) == _shapes(
+            self._state
+        )
 
     def write_shape(self, state: State) -> None:
         """Give a state of the same model, or of one with other numbers, the shape, the stimuli and the loads."""
@@ -211,8 +222,8 @@ class Equilibrium:
 
     def _with(self, path: str, value: float) -> Nearby:
         """Return the model with another number in its scene."""
-        model = self._model_of(scene_with(self.scene, path, value))
-        stepper = self._stepper_of(model)
+        model = self._builders.model_of(scene_with(self.scene, path, value))
+        stepper = self._builders.stepper_of(model)
         state = self._carried(model)
         if state is None:
             raise InputError(f"gradient: {path} changes how many unknowns the model has")
@@ -221,7 +232,7 @@ class Equilibrium:
 
     def _carried(self, model: Model) -> State | None:
         """Return the state of another model that departs from its start as the present one does."""
-        state, here, start = self._state_of(model), self._state, self._start
+        state, here, start = self._builders.state_of(model), self._state, self._start
         if not self.fits(model):
             return None
         turned = state.body_rotation @ start.body_rotation.swapaxes(1, 2)
@@ -233,10 +244,7 @@ class Equilibrium:
             getattr(state, part)[:] = getattr(here, part)
         if not same:
             state.body_rotation[:] = turned @ here.body_rotation
-        if not np.array_equal(state.position, here.position):
-            before, after = (_tangents(self.model, of) for of in (here.position, state.position))
-            leaning = np.einsum("ki,ki->k", after, state.director1) / (1.0 + np.einsum("ki,ki->k", before, after))
-            state.director1 -= leaning[:, None] * (before + after)
+        carry_directors(model, here.position, state)
         return state
 
     def _solved(self, gradient: Motion) -> Motion:
@@ -261,7 +269,7 @@ class Equilibrium:
         """
         found = {name: list(self._parameters_of(name)) for name in names}
         numbers = [(p.name, p.value) for of in found.values() for p in of]
-        laws = laws_of(self.model, self._model_of, numbers)
+        laws = laws_of(self.model, self._builders.model_of, numbers)
         return {
             name: [self._of_laws(p, laws[p.name]) if p.name in laws else p for p in of] for name, of in found.items()
         }
@@ -334,9 +342,3 @@ class Equilibrium:
 
 def _shapes(state: State) -> list[tuple[int, ...]]:
     return [getattr(state, part).shape for part in ("position", "body_position", *HELD)]
-
-
-def _tangents(model: Model, position: Array) -> Array:
-    """Return the unit tangents of edges, shape (n_edge, 3)."""
-    vector = position[model.rods.edge_node + 1] - position[model.rods.edge_node]
-    return vector / np.linalg.norm(vector, axis=1, keepdims=True)

@@ -13,11 +13,14 @@ from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.log.run.frame_values import FrameValues
 from bilayer_core.log.run.quantities import entries
 from bilayer_core.model.lit_elements import light_of, part_seen
+from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import AT_REST, Configuration
 from bilayer_core.model.state import State, reached_at_rest
 from bilayer_core.observed.frame import Description
+from bilayer_core.scene.config import SceneConfig
 from bilayer_core.simulation.capture import Capture, make_frame
 from bilayer_core.simulation.gains import put_gains
+from bilayer_core.simulation.gradients.step_again import tangents_of
 from bilayer_core.simulation.observation import strand
 from bilayer_core.simulation.statistics import RunStatistics
 from bilayer_core.simulation.stepper import Stepper
@@ -32,6 +35,35 @@ PLACES = (-1.0, -0.5, 0.5, 1.0)
 def slope(values: Sequence[Any], h: float) -> Any:
     """Return the derivative from values at `PLACES`."""
     return ((values[2] + values[1] * -1.0) * 8.0 + (values[3] + values[0] * -1.0) * -1.0) * (1.0 / (6.0 * h))
+
+
+@dataclass(frozen=True)
+class Builders:
+    """Make the model of a scene, and the stepper and the first state of a model."""
+
+    model_of: Callable[[SceneConfig], Model]
+    stepper_of: Callable[[Model], Stepper]
+    state_of: Callable[[Model], State]
+
+
+def known_quantities(stepper: Stepper, state: State, description: Description) -> dict[str, Any]:
+    """Return entries of quantities at a state, by the names by which may be differentiated."""
+    stepper.evaluate(state)
+    frame = make_frame(Capture(stepper, state), RunStatistics(), 0.0)
+    return {
+        entry.name: entry
+        for entry in entries(description, frame.energy, ())
+        if not entry.name.startswith("stimulus/") and not entry.name.endswith("/frame")
+    }
+
+
+def carry_directors(model: Model, before: Array, state: State) -> None:
+    """Carry the directors of a state from where nodes were, shape (n_node, 3), to where they are."""
+    if np.array_equal(before, state.position):
+        return
+    first, second = (tangents_of(model.rods.edge_node, position) for position in (before, state.position))
+    leaning = np.einsum("ki,ki->k", second, state.director1) / (1.0 + np.einsum("ki,ki->k", first, second))
+    state.director1 -= leaning[:, None] * (first + second)
 
 
 def values_of(stepper: Stepper, state: State, wanted: Sequence[str], description: Description) -> list[Array]:
