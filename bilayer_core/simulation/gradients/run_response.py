@@ -36,6 +36,7 @@ from bilayer_core.simulation.gradients.parameters import STEP, laws_of, numbers_
 from bilayer_core.simulation.gradients.step_again import KeptStep, Reached, StepAgain
 from bilayer_core.simulation.gradients.step_rates import Inputs, Rates, StepRates
 from bilayer_core.simulation.same_model import differing
+from bilayer_core.simulation.settling import SETTLE
 from bilayer_core.simulation.stepper import Stepper
 from bilayer_core.simulation.surroundings import Surroundings
 
@@ -166,6 +167,8 @@ class RunResponse:
             for method in self._stepper.engine.methods
         ):
             reasons.append("an integrator whose steps end beyond their last stage")
+        if self.scene.start == SETTLE:
+            reasons.append("a start that settles")
         problem = self._stepper.engine.problem
         if problem.light.exists:
             reasons.append("light")
