@@ -254,7 +254,7 @@ class Engine:
 
     @property
     def stood_in(self) -> bool:
-        """Whether the last steps were made by what stands in for a method with a history."""
+        """True if the last steps were made by what stands in for a method with a history."""
         return self._counts.restarts > 0
 
     @property

@@ -16,7 +16,7 @@ from bilayer_core.model.records.step import Configuration, Method, StageInputs, 
 
 @piece(int, Problem, StateArrays, Method, Actuation, StageInputs, Work, float, float, float, Configuration)
 def begin_step(p, state, method, actuation, inputs, work, begin, h, same, start):
-    """Stand at the start of a step of length h [s] from `begin` [s], with what acts during it."""
+    """Take the start of a step of length h [s] from `begin` [s], with what acts during it."""
     take_first_stimuli(actuation, begin, same, inputs)
     drive_step(actuation, method.nodes, begin, h, same, inputs)
     take_state(p, state, start)

@@ -727,7 +727,7 @@ class Simulator:
 
     @property
     def _builders(self) -> Builders:
-        """What makes models, steppers and states of scenes nearby."""
+        """Makers of models, steppers and states of scenes nearby."""
         plan, method, steps, most = self.plan, self._method, self.steps, self.scene.solver.max_newton_iterations
         return Builders(
             lambda scene: build_model(scene, plan.model, plan.dimension),

@@ -85,7 +85,7 @@ class Course:
         return outside.tobytes() != self._spans[-1].outside.tobytes()
 
     def _thin(self) -> None:
-        """Join spans, two and two, between which nothing was set from outside."""
+        """Put spans together, two and two, between which nothing was set from outside."""
         self._stride *= 2
         joined: list[_Span] = []
         for span in self._spans:

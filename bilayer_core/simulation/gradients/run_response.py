@@ -67,7 +67,7 @@ NEAR = 1e-5
 
 @dataclass
 class Direct:
-    """What a number changes by itself in a step: inputs, and with them the gradient where stages ended, and its end.
+    """Changes by a number alone in a step: of inputs, of the gradient where stages ended, and of the end.
 
     Arrays are columns of `Inputs` and `Rates`.
     """

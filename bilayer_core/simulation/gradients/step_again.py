@@ -101,7 +101,7 @@ class StepAgain(Evaluator):
         self.size = len(self.sums.gradient)
 
     def begin(self, step: KeptStep) -> None:
-        """Stand at the start of a step, with what acts during it."""
+        """Take the start of a step, with what acts during it."""
         self._step, surroundings = step, self.surroundings
         self._take(step.start)
         surroundings.cover(step.begin, step.start.override, step.start.pose_goal)
@@ -111,12 +111,12 @@ class StepAgain(Evaluator):
 
     @property
     def inputs(self):
-        """What acts at the points of the step."""
+        """Inputs at the points of the step."""
         return self._inputs
 
     @property
     def transduction(self) -> Array:
-        """What modes have reached at the stage, shape (n_mode,)."""
+        """Stimuli that modes have reached at the stage, shape (n_mode,)."""
         return self._work.transduction
 
     @property
@@ -131,7 +131,7 @@ class StepAgain(Evaluator):
 
     @property
     def origin_rates(self) -> Array:
-        """And at its origin."""
+        """Rates of strains at its origin, likewise."""
         return self._work.origin.strain_rate
 
     def start(self, n: int) -> None:

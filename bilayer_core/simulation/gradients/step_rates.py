@@ -99,14 +99,14 @@ class Inputs:
 
 
 def _triple(of: Array) -> Array:
-    """Return [v]× of vectors, shape (n, 3, 3)."""
+    """Return the matrices [v]× of vectors, shape (n, 3, 3)."""
     out = np.zeros((len(of), 3, 3))
     out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -of[:, 2], of[:, 1], -of[:, 0]
     return out - out.swapaxes(1, 2)
 
 
 class Constants:
-    """What rates of all steps of a model share: masses, damping, and which strains are apart from each other."""
+    """Matrices that rates of all steps of a model share, and which strains are apart from each other."""
 
     def __init__(self, model: Model, again: StepAgain):
         problem, strands = again.problem, again.problem.strands

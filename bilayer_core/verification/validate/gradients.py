@@ -180,6 +180,12 @@ CASES = (
         end_of_run("bending", ON_A_POST | {LEVEL: 0.1}, 0.2, LEVEL),
     ),
     Case(
+        "gradients/runs/rods that touch/density",
+        "differences of runs",
+        1e-4,
+        end_of_run("knot", {"contact.friction": None}, 0.01, "materials.rubber.density"),
+    ),
+    Case(
         "gradients/runs/back", "the same forward", 1e-10, adjoint("bending", SWELLING | VISCOUS | IN_SPACE, 0.1, GAIN)
     ),
     *(Case(f"gradients/{name}", DIFFERENCES, 1e-6, height(*of)) for name, of in ANEW.items()),
