@@ -14,8 +14,10 @@ from bilayer_core.engine.integrate import Attempt, Clock, Counts, Failure, Integ
 from bilayer_core.engine.observables import Observables, observe
 from bilayer_core.engine.potential import add_forces, expand_to_unknowns
 from bilayer_core.engine.run_extrema import count_shape
-from bilayer_core.engine.step import treat_state, write_rest_strains
+from bilayer_core.engine.step import make_step, treat_state, write_rest_strains
 from bilayer_core.engine.step_outcome import FAILURES, IntegrationReport
+from bilayer_core.engine.step_size import tolerance_in
+from bilayer_core.engine.steps_again import begin_step
 from bilayer_core.engine.storage import Storage, new_configuration, new_work
 from bilayer_core.errors import SimulationError
 from bilayer_core.forces.joints import Joints
@@ -141,6 +143,24 @@ class Engine:
             failure = self._failure
             figures |= {name: getattr(failure, name) for name in failure.names}
         return IntegrationReport(done, status, pair, **figures)
+
+    def make_again(self, state: State, stood_in: bool, length: float, same: float) -> int:
+        """Make a step of a given length [s] by the method, or by what stands in for it, whatever its error is; return
+        its status. Times that differ by less than `same` [s] are the same.
+        """
+        begin, used = float(state.time[0]), self.methods[-1 if stood_in else 0]
+        self._storage.set_friction(state.friction)
+        while True:
+            run, problem, work = self._parts_for(state), self._storage.problem, self._work
+            run.start_state.values[:] = state.values
+            self._outcome.passes, self._outcome.patience = NO_LIMIT, 0
+            acts, when = (self.actuation, self._inputs, work), (begin, length, same)
+            begin_step(problem, run.state, used, *acts, *when, self._configurations[0])
+            tolerance = tolerance_in.py_func(length, self._newton[0])
+            by = used, self.methods[0].history, self._inputs, work
+            status = make_step(problem, run.state, run.start_state, *by, length, tolerance, self._newton[1])
+            if not self.reserve(status, state):
+                return status
 
     def do_once(self, state: State, mode: int, length: float = 0.0, tolerance: float = math.inf) -> IntegrationReport:
         """Execute a request (`engine.request_modes`) on a state at rest, with the drive set; return a report."""

@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Any
-
 from bilayer_core.model.state import State
 from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.simulation.stepper import Stepper
 
 
-def stepper_and_state(simulator: Simulator, **steps: Any) -> tuple[Stepper, State]:
-    """Return what makes steps of a robot with other settings of steps, and a copy of its state."""
-    stepper = Stepper(
-        simulator.model,
-        simulator._method,
-        replace(simulator.steps, **steps),
-        simulator.scene.solver.max_newton_iterations,
-    )
-    return stepper, simulator._now.copy()
+def stepper_and_state(simulator: Simulator) -> tuple[Stepper, State]:
+    """Return another maker of steps of a robot, and a copy of its state."""
+    return simulator._builders.stepper_of(simulator.model), simulator._now.copy()
 
 
 def equilibrium_of(simulator: Simulator) -> Equilibrium:

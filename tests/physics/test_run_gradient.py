@@ -30,6 +30,8 @@ ON_A_POST = {
 }
 MOVES = {"bodies.wall.motion": {"type": "prescribed", "times": [0, 0.1], "displacements": [[0, 0, 0], [0, 0, 0.01]]}}
 EULER = {"solver.integrator": "implicit_euler", "solver.dt": 0.004, "solver.tolerance": None}
+ALPHA = {"solver.integrator": "generalised_alpha"}
+UNLIKE = {"solver.integrator": "tr_bdf2", THICKNESS: 1.5e-4}
 VISCOUS, SPACE = {VISCOSITY: 0.05}, {"solver.dimension": 3}
 CASES = {
     "in a plane": ("bending", HANGING, 0.2, [GAIN, LEVEL, TIME, MODULUS, THICKNESS, "gravity.2", LENGTH]),
@@ -38,6 +40,8 @@ CASES = {
     "implicit euler with fixed steps": ("bending", HANGING | EULER, 0.1, [GAIN, MODULUS, LENGTH]),
     "viscosity": ("bending", HANGING | VISCOUS, 0.2, [GAIN, DENSITY, LENGTH, VISCOSITY]),
     "viscosity in space": ("bending", HANGING | VISCOUS | SPACE, 0.1, [GAIN, VISCOSITY]),
+    "generalised alpha": ("bending", HANGING | ALPHA | VISCOUS | SPACE, 0.1, [GAIN, MODULUS, THICKNESS]),
+    "layers that become unlike": ("bending", HANGING | UNLIKE, 0.1, [MODULUS, DENSITY]),
     "a lag": ("bending", HANGING | {LAG: 0.05}, 0.2, [GAIN, LEVEL, LAG]),
     "masses off the curve": ("bending", HANGING | {THICKNESS: 1.5e-4, DENSITY: 2000.0}, 0.1, [THICKNESS, LENGTH]),
     "a clamp that moves": ("bending", HANGING | MOVES, 0.1, [GAIN, "bodies.wall.motion.displacements.1.2"]),
@@ -61,10 +65,10 @@ def error(found, other):
 def test_gradients_of_runs_agree_with_differences_of_runs_to_1e_6(case):
     name, overrides, duration, to = CASES[case]
     simulator, result = kept_run(name, overrides, duration)
-    ends = result.differentiable.ends
+    steps = result.differentiable.made
     found = result.gradient("com", to)
     for path in to:
-        (other,) = differences_of_runs(name, overrides, ends, path, STEPS.get(path, 1e-4), ["com"])
+        (other,) = differences_of_runs(name, overrides, steps, path, STEPS.get(path, 1e-4), ["com"])
         assert error(found["com", path], other) < 1e-6, path
 
 
@@ -75,16 +79,16 @@ def test_gradients_of_runs_through_contact_agree_to_1e_4(to):
     of = ["com", "rod/strip/position"]
     found = result.gradient(of, to)
     for name, other in zip(
-        of, differences_of_runs("bending", ON_A_POST, result.differentiable.ends, to, 1e-5, of), strict=True
+        of, differences_of_runs("bending", ON_A_POST, result.differentiable.made, to, 1e-5, of), strict=True
     ):
         assert error(found[name, to], other) < 1e-4, name
 
 
 def test_differences_of_runs_over_a_ladder_of_steps_reach_a_plateau_at_the_gradient():
     simulator, result = kept_run("bending", HANGING, 0.1)
-    found, ends = result.gradient("com", THICKNESS)["com", THICKNESS], result.differentiable.ends
+    found, steps = result.gradient("com", THICKNESS)["com", THICKNESS], result.differentiable.made
     ladder = [
-        error(differences_of_runs("bending", HANGING, ends, THICKNESS, step, ["com"])[0], found)
+        error(differences_of_runs("bending", HANGING, steps, THICKNESS, step, ["com"])[0], found)
         for step in (1e-2, 1e-3, 1e-4, 1e-9)
     ]
     assert ladder[0] > 50.0 * ladder[1] > 1e-6  # second order: 100 times
@@ -96,6 +100,7 @@ BACK = {
     "in a plane": ("bending", HANGING, 0.1, [GAIN, LEVEL, THICKNESS, LENGTH]),
     "in space": ("bending", HANGING | SPACE | VISCOUS, 0.1, [GAIN, LEVEL, MODULUS, VISCOSITY]),
     "fibres in space": ("chiral_pod", {}, 0.02, ["gravity.2"]),
+    "generalised alpha": ("bending", HANGING | ALPHA | VISCOUS, 0.1, [GAIN, MODULUS]),
     "contact": ("bending", ON_A_POST, 0.2, [LEVEL, "obstacles.post.radius"]),
 }
 

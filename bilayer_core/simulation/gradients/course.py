@@ -51,9 +51,9 @@ class Course:
         return sum(len(span.ends) for span in self._spans)
 
     @property
-    def ends(self) -> list[float]:
-        """Times at which steps ended [s]."""
-        return [time for span in self._spans for time in span.ends]
+    def made(self) -> list[tuple[float, bool]]:
+        """Times at which steps ended [s], and whether another method stood in."""
+        return [step for span in self._spans for step in zip(span.ends, span.stood_in, strict=True)]
 
     @property
     def end(self) -> State:
@@ -123,8 +123,7 @@ class Course:
             if k + 1 == len(span.ends):
                 state.values[:] = end
             else:
-                state.next_step[0] = time - float(state.time[0])
-                maker.integrate(state, 1, time)
+                maker.make_again(state, time, stood_in)
             yield KeptStep(start, state.copy(), self._method(stood_in))
 
     def _method(self, stood_in: bool) -> Method:

@@ -122,9 +122,9 @@ class DifferentiableRun:
         return keep
 
     @property
-    def ends(self) -> list[float]:
-        """Times at which steps ended [s]."""
-        return self._course.ends
+    def made(self) -> list[tuple[float, bool]]:
+        """Times at which steps ended [s], and whether another method stood in."""
+        return self._course.made
 
     def response(self) -> RunResponse:
         """Return what goes along the steps and back."""

@@ -69,7 +69,7 @@ NEAR = 1e-5
 class Direct:
     """Changes by a number alone in a step: of inputs, of the gradient where stages ended, and of the end.
 
-    Arrays are columns of `Inputs` and `Rates`.
+    Arrays are columns of `Inputs` and `Rates`; `next_rates` are `Number.rates` at the end of the step.
     """
 
     first: Array
@@ -79,6 +79,7 @@ class Direct:
     strain_rate: Array
     reached: Array
     strain_push: Array
+    next_rates: list[tuple[Array, Array]] | None = None
 
 
 @dataclass
@@ -97,8 +98,8 @@ class Number:
         Of models with it there.
     own : bool
         Whether their models are others.
-    rates : ndarray or None
-        Rates of strains at the start of the next step, where only these models have any.
+    rates : list of tuple or None
+        Rates of strains of each of these models at the start of the next step, and theirs, where only they have some.
     """
 
     path: str
@@ -108,7 +109,7 @@ class Number:
     around: list[Surroundings] = field(default_factory=list)
     agains: list[StepAgain] = field(default_factory=list)
     own: bool = False
-    rates: Array | None = None
+    rates: list[tuple[Array, Array]] | None = None
 
 
 class RunResponse:
@@ -232,8 +233,10 @@ class RunResponse:
             found.agains = [self._again(model, of) for model, of in zip(models, around, strict=True)]
         else:
             found.agains, found.own = [self._again(self._builders.model_of(scene)) for scene in scenes], True
-            if found.agains[0].end_rates.size != self._here.end_rates.size:
-                found.rates = self._builders.state_of(found.agains[0].model).strain_rate
+            raised = [of.problem.raised.edge for of in (found.agains[0], self._here)]
+            if found.agains[0].end_rates.size != self._here.end_rates.size or not np.array_equal(*raised):
+                states = [self._builders.state_of(again.model) for again in found.agains]
+                found.rates = [(state.strain_rate, state.strain_acceleration) for state in states]
         if any(
             again.size != self._here.size or again.model.node_count != self.model.node_count for again in found.agains
         ):
@@ -283,15 +286,17 @@ class RunResponse:
             firsts, stimuli = zip(*(self._inputs(around, step, count) for around in number.around), strict=True)
             found.first, found.stimulus = slope(firsts, h), slope(stimuli, h)
         else:
-            starts = [self._fitted(number, again, step.start) for again in number.agains]
+            own = number.rates or [None] * len(number.agains)
             seen = [
-                self._replayed(again, replace(step, start=start), reached)
-                for again, start in zip(number.agains, starts, strict=True)
+                self._replayed(again, replace(step, start=self._fitted(again, step.start, rates)), reached)
+                for again, rates in zip(number.agains, own, strict=True)
             ]
             *found.gradient, reached_by, rates, push = (slope(values, h) for values in zip(*seen, strict=True))
             found.reached = reached_by
             if number.rates is None:
                 found.strain_rate, found.strain_push = rates, push
+            else:
+                found.next_rates = [(values[-2], values[-1]) for values in seen]
         return found
 
     def _inputs(self, around: Surroundings, step: KeptStep, count: int) -> tuple[Array, Array]:
@@ -311,10 +316,15 @@ class RunResponse:
             again.go(n, place)
             gradients.append(again.gradient(n))
             again.finish(n)
-        push = (again.end_rates - again.origin_rates) / (again.stage.momentum_length * (1.0 - step.method.carry))
+        carry = step.method.carry
+        push = (again.end_rates - again.origin_rates) / again.stage.momentum_length
+        if self._history:
+            push = (push - carry * step.start.strain_acceleration) / (1.0 - carry)
+            if not step.method.history:
+                push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
         return [*gradients, again.transduction.copy(), again.end_rates.copy(), push]
 
-    def _fitted(self, number: Number, again: StepAgain, state: State) -> State:
+    def _fitted(self, again: StepAgain, state: State, rates: tuple[Array, Array] | None) -> State:
         """Return a state that a model with another number takes: with what only such models have, prescribed bodies
         where they are then, and with them the nodes that bodies hold.
         """
@@ -324,8 +334,10 @@ class RunResponse:
             mine, part = getattr(fitted, name), getattr(state, name)
             if mine.shape == part.shape:
                 mine[...] = part
-        if number.rates is not None:
-            fitted.strain_rate[:] = number.rates
+        if rates is not None:
+            fitted.strain_rate[:] = rates[0]
+            if self._history:
+                fitted.strain_acceleration[:] = rates[1]
         again.begin(KeptStep(fitted, fitted, self._stepper.engine.methods[0]))
         moved, constrained = again.problem.bodies.prescribed, again.problem.constrained
         moved = moved[moved < len(fitted.body_position)]
@@ -334,8 +346,8 @@ class RunResponse:
         held = again.places[0]
         again.take_state(fitted, held)
         fitted.position[:] = held.position
-        rates = again.inputs.rates[0, constrained.body]
-        fitted.velocity[constrained.node] = rates[:, :3] + np.cross(rates[:, 3:], held.arm)
+        moving = again.inputs.rates[0, constrained.body]
+        fitted.velocity[constrained.node] = moving[:, :3] + np.cross(moving[:, 3:], held.arm)
         carry_directors(model, state.position, fitted)
         return fitted
 
@@ -362,9 +374,8 @@ class RunResponse:
                 np.stack([of.stimulus for of in direct], axis=-1),
                 np.stack([of.gain for of in direct], axis=-1),
             )
-            for number in numbers:
-                if number.rates is not None:
-                    number.rates = number.agains[0].end_rates.copy()
+            for number, own in zip(numbers, direct, strict=True):
+                number.rates = own.next_rates
             none = np.zeros(self._here.size)
             gradients = [
                 np.stack([of.gradient[n] if of.gradient else none for of in direct], axis=-1)
@@ -419,15 +430,14 @@ class RunResponse:
             found[k] += sum(float(own @ by[:, 0]) for own, by in starts)
         return found.tolist()
 
-    def _rates_at_starts(self, numbers: Sequence[Number]) -> list[tuple[Number, list[Array]]]:
+    def _rates_at_starts(self, numbers: Sequence[Number]) -> list[tuple[Number, list]]:
         """Return the rates of strains that only models with some numbers have, at the start of each step."""
-        begun: list[tuple[Number, list[Array]]] = [(number, []) for number in numbers]
+        begun: list[tuple[Number, list]] = [(number, []) for number in numbers]
         for step in self._course.steps(self._maker) if begun else ():
             reached = self._rates.take(step)
             for number, rates_at_starts in begun:
                 rates_at_starts.append(number.rates)
-                self._direct(number, step, reached)
-                number.rates = number.agains[0].end_rates.copy()
+                number.rates = self._direct(number, step, reached).next_rates
         return begun
 
     def values(self, number: Number, along: Rates, k: int, wanted: Sequence[str]) -> tuple[list[Array], list[Array]]:
@@ -450,7 +460,7 @@ class RunResponse:
         elif not number.laws.size:
             model = replace(model, scene=scene_with(self.scene, number.path, number.value + way))
         stepper, evaluator = self._builders.stepper_of(model), self._again(model)
-        state = self._fitted(number, evaluator, self._course.end)
+        state = self._fitted(evaluator, self._course.end, number.rates and number.rates[0])
         at, there = evaluator.new(), evaluator.new()
         evaluator.take_state(state, at)
         no_bodies = np.zeros_like(evaluator.problem.system.body_step)

@@ -403,6 +403,14 @@ class StepRates:
                 found[k, m] = lagged(*unit, lag, lag, float(inputs.elapsed[n]))
         return found
 
+    @property
+    def _forgotten(self) -> slice:
+        """Rows of rates of rates of strains that a step leaves without which the method has no history."""
+        size, raised = self.constants.size, self._agains[0].problem.raised
+        if self.step.method.history:
+            return slice(0, 0)
+        return slice(size, size + raised.first if raised.exists else None)
+
     # forward
 
     def forward(self, start: Rates, acts: Inputs, direct: Sequence[Array] | None = None) -> Rates:
@@ -458,6 +466,7 @@ class StepRates:
             place, turn = moved, end[edges]
         kept = (end_speed - origin_speed) / stage.momentum_length
         kept = (kept - method.carry * push) / (1.0 - method.carry)
+        kept[self._forgotten] = 0.0
         return Rates(place, end_speed[:size], end_speed[size:], reached, kept[:size], kept[size:])
 
     def _solved(self, n: int, right: Array, lacking: sparse.csr_matrix | None) -> Array:
@@ -498,6 +507,7 @@ class StepRates:
         direct: list[Array] = [np.zeros((size, columns))] * count
         places[-1] += end.place
         kept = np.concatenate([end.push, end.strain_push]) / (1.0 - method.carry)
+        kept[self._forgotten] = 0.0
         push -= method.carry * kept
         end_speeds[-1] += np.concatenate([end.speed, end.strain_rate]) + kept / self._stages[-1].momentum_length
         origin_speeds[-1] -= kept / self._stages[-1].momentum_length

@@ -18,6 +18,7 @@ TOLERANCE = 1e-14
 """Displacement that counts as rest [m]."""
 TIGHT = {"solver.newton_tolerance": 1e-12}
 """For runs."""
+Steps = Sequence[tuple[float, bool]]
 STEP = 2e-4
 """Of the parameter: differences are of fourth order."""
 HANGING: dict[str, Any] = {"gravity": [0, 0, -9.81]}
@@ -66,7 +67,7 @@ def end_of_run(
     def measured() -> tuple[float, float]:
         run = Simulator(load_scene(name, TIGHT | overrides)).run(duration, gradients=True)
         found = run.gradient(of, to)[of, to].ravel()
-        (other,) = differences_of_runs(name, overrides, run.differentiable.ends, to, step, [of])
+        (other,) = differences_of_runs(name, overrides, run.differentiable.made, to, step, [of])
         place = int(np.abs(other).argmax())
         return float(found[place]), float(other.ravel()[place])
 
@@ -74,27 +75,25 @@ def end_of_run(
 
 
 def differences_of_runs(
-    name: str, overrides: dict[str, Any], ends: Sequence[float], to: str, step: float, of: Sequence[str]
+    name: str, overrides: dict[str, Any], steps: Steps, to: str, step: float, of: Sequence[str]
 ) -> list[np.ndarray]:
-    """Return differences of quantities at the end of two runs whose steps end at given times [s], over the parameter,
-    which is `step` of its value away on either side.
+    """Return differences of quantities at the end of two runs with the steps of another, over the parameter, which
+    is `step` of its value away on either side.
     """
     holder, place = read_overrides({to: 0.0})[0].find(scene_content(load_scene(name, overrides)))
     h, sides = step * (abs(holder[place]) or 1.0), []
     for way in (-1.0, 1.0):
         simulator = Simulator(load_scene(name, TIGHT | overrides | {to: holder[place] + way * h}))
-        sides.append(with_steps(simulator, ends, of))
+        sides.append(with_steps(simulator, steps, of))
     return [(high - low) / (2.0 * h) for low, high in zip(*sides, strict=True)]
 
 
-def with_steps(simulator: Simulator, ends: Sequence[float], of: Sequence[str]) -> list[np.ndarray]:
-    """Return quantities at the end of a run whose steps end at given times [s], whatever their errors are."""
-    stepper, state = stepper_and_state(simulator, tolerance=1e9, longest=1e9)
-    for end in ends:
-        state.next_step[0] = end - float(state.time[0])
-        stepper.integrate(state, 1, end)
-        if state.time[0] != end:
-            raise ArithmeticError(f"a step to {end} s ended at {state.time[0]} s")
+def with_steps(simulator: Simulator, steps: Steps, of: Sequence[str]) -> list[np.ndarray]:
+    """Return quantities at the end of a run with the steps of another run, whatever their errors are."""
+    stepper, state = stepper_and_state(simulator)
+    stepper.evaluate(state)
+    for end, stood_in in steps:
+        stepper.make_again(state, end, stood_in)
     return values_of(stepper, state, of, simulator.description)
 
 
