@@ -650,7 +650,9 @@ class Simulator:
                 progress = bar.enter_context(progress_bar(self.scene.name, self.time, end))
             callbacks = Callbacks(stop, interrupted, progress or None, each_step)
             result = self._loop.run(self, duration, until, observers, inputs, callbacks)
-        return replace(result, log="" if log is None else str(log), differentiable=differentiable)
+        if log is None and differentiable is None:
+            return result
+        return replace(result, log=str(log or ""), differentiable=differentiable)
 
     def attach(self, observer: Observer) -> Callable[[], None]:
         """Show frames to an observer from now on, at its rate, whoever makes steps.
