@@ -15,8 +15,10 @@ from bilayer_core.engine.integrate import Attempt, Clock, Counts, Failure, Integ
 from bilayer_core.engine.observables import Observables, observe
 from bilayer_core.engine.potential import add_forces, expand_to_unknowns
 from bilayer_core.engine.run_extrema import count_shape
-from bilayer_core.engine.step import treat_state, write_rest_strains
+from bilayer_core.engine.step import make_step, treat_state, write_rest_strains
 from bilayer_core.engine.step_outcome import FAILURES, IntegrationReport
+from bilayer_core.engine.step_size import tolerance_in
+from bilayer_core.engine.steps_again import begin_step
 from bilayer_core.engine.storage import Storage, new_configuration, new_work
 from bilayer_core.errors import SimulationError
 from bilayer_core.forces.joints import Joints
@@ -29,7 +31,7 @@ from bilayer_core.model.contact_points import contact_point_names
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.contacts import RodContact, Surfaces
 from bilayer_core.model.records.parts import Mechanisms
-from bilayer_core.model.records.problem import Sums
+from bilayer_core.model.records.problem import Problem, Sums
 from bilayer_core.model.records.step import RunExtrema, StageInputs, StateArrays
 from bilayer_core.model.state import State
 
@@ -67,6 +69,8 @@ class Engine:
     numbers_of_extrema : Numbers
     passes : int
         Of Newton's method, in the last steps.
+    methods : list of Method
+        The integrator's coefficients, and last those of what stands in for one with a history.
     """
 
     def __init__(
@@ -78,7 +82,7 @@ class Engine:
         self._outcome, self.gap, self.passes = self._storage.outcome, math.inf, 0
         self._numbers_of_outcome = Numbers(self._outcome)
         methods = (method, SELF_STARTING) if method.history else (method,)
-        self._methods = [used.arrays() for used in methods]
+        self.methods = [used.arrays() for used in methods]
         self._configurations = [new_configuration(model, sizes) for _ in range(3)]
         self.end = self._configurations[1]
         self._work = new_work(sizes, self._configurations, max(len(used.nodes) for used in methods))
@@ -147,6 +151,24 @@ class Engine:
             figures |= self._numbers_of_failure.read()
         return IntegrationReport(done, status, found["pair"], **figures)
 
+    def make_again(self, state: State, stood_in: bool, length: float, same: float) -> int:
+        """Make a step of a given length [s] by the method, or by what stands in for it, whatever its error is; return
+        its status. Times that differ by less than `same` [s] are the same.
+        """
+        begin, used = float(state.time[0]), self.methods[-1 if stood_in else 0]
+        self._storage.set_friction(state.friction)
+        while True:
+            run, problem, work = self._parts_for(state), self._storage.problem, self._work
+            run.start_state.values[:] = state.values
+            self._outcome.passes, self._outcome.patience = NO_LIMIT, 0
+            acts, when = (self.actuation, self._inputs, work), (begin, length, same)
+            begin_step(problem, run.state, used, *acts, *when, self._configurations[0])
+            tolerance = tolerance_in.py_func(length, self._newton[0])
+            by = used, self.methods[0].history, self._inputs, work
+            status = make_step(problem, run.state, run.start_state, *by, length, tolerance, self._newton[1])
+            if not self.reserve(status, state):
+                return status
+
     def do_once(self, state: State, mode: int, length: float = 0.0, tolerance: float = math.inf) -> IntegrationReport:
         """Execute a request (`engine.request_modes`) on a state at rest, with the drive set; return a report."""
         self._storage.set_friction(state.friction)
@@ -167,7 +189,7 @@ class Engine:
         problem, parts = self._storage.problem, self._integration
         known = parts is not None and parts.problem is problem and parts.actuation is self.actuation
         if not known or state is not self._state:
-            methods, start_state = self._methods, state.copy()
+            methods, start_state = self.methods, state.copy()
             arrays, start_arrays = (
                 StateArrays(**{name: getattr(of, name) for name in StateArrays.names}) for of in (state, start_state)
             )
@@ -207,6 +229,11 @@ class Engine:
             return self._storage.grow(status)
         except CapacityError as refusal:
             raise SimulationError(refusal.reason, float(state.time[0]), refusal.remedy) from None
+
+    @property
+    def problem(self) -> Problem:
+        """All records of forces."""
+        return self._storage.problem
 
     @property
     def sums(self) -> Sums:
@@ -250,6 +277,11 @@ class Engine:
     def moved(self) -> float:
         """Largest displacement of a material point in the last round of statics [m]."""
         return float(self._work.moved[0])
+
+    @property
+    def stood_in(self) -> bool:
+        """True if the last steps were made by what stands in for a method with a history."""
+        return self._counts.restarts > 0
 
     @property
     def unstable(self) -> int:

@@ -72,13 +72,13 @@ class Evaluator:
         Start of a step, or origin of a stage: it may be changed between `start_point` and `predict`.
     """
 
-    def __init__(self, model: Model):
+    def __init__(self, model: Model, stages: int = 1, history: bool = False):
         self.model = model
         self._storage = Storage(model)
-        self._state = initial_state(model, memory=memory_size(model))
+        self._state = initial_state(model, history, memory=memory_size(model))
         self._arrays = StateArrays(**{name: getattr(self._state, name) for name in StateArrays.names})
         sizes = self._storage.sizes
-        self._work, self._inputs = new_work(sizes, [], 1), new_inputs(model, sizes, 1)
+        self._work, self._inputs = new_work(sizes, [], stages), new_inputs(model, sizes, stages)
         self.stage: Stage = self._work.stage
         self.point: Point = self._work.origin
 

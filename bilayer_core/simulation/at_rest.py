@@ -1,9 +1,16 @@
-"""Equilibria of simulators, for studies that go from one to the next."""
+"""Equilibria and steps of simulators, for studies that go from one to the next."""
 
 from __future__ import annotations
 
-from bilayer_core.simulation.gradient import Equilibrium
+from bilayer_core.model.state import State
+from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
 from bilayer_core.simulation.simulator import Simulator
+from bilayer_core.simulation.stepper import Stepper
+
+
+def stepper_and_state(simulator: Simulator) -> tuple[Stepper, State]:
+    """Return another maker of steps of a robot, and a copy of its state."""
+    return simulator._builders.stepper_of(simulator.model), simulator._now.copy()
 
 
 def equilibrium_of(simulator: Simulator) -> Equilibrium:

@@ -56,7 +56,7 @@ def displacement(model: Model, start: Configuration, end: Configuration) -> Edge
     parallel transport.
     """
     edges = model.rods.edge_count
-    turn = _turn(start.tangent, start.director1, end.tangent, end.director1)
+    turn = turn_between(start.tangent, start.director1, end.tangent, end.director1)
     clamp_edge = np.column_stack([end.tangent[edges:] - start.tangent[edges:], turn[edges:]])
     contact = np.hstack([end.pose_position - start.pose_position, np.zeros_like(end.pose_position)])
     for b in range(len(model.bodies.names)):
@@ -89,7 +89,7 @@ def of_prescribed(model: Model, motion: EdgeVector) -> EdgeVector:
     )
 
 
-def _turn(tangent: Array, director: Array, new_tangent: Array, new_director: Array) -> Array:
+def turn_between(tangent: Array, director: Array, new_tangent: Array, new_director: Array) -> Array:
     """Return the angle about the new tangent from the transported director to the new one [rad], shape (n,)."""
 
     def dot(u: Array, v: Array) -> Array:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,10 @@ from bilayer_core.errors import InputError
 from bilayer_core.printable import html_table
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from bilayer_core.log.run.run_data import RunData
+    from bilayer_core.simulation.gradients.derivatives import DifferentiableRun, Gradient
 
 
 class Termination(Enum):
@@ -39,6 +43,8 @@ class RunResult:
         CPU seconds of the stepping thread and elapsed seconds, without compilation.
     log : str
         The file that the run was asked to write; empty for none.
+    differentiable : DifferentiableRun or None
+        Its steps, if they were kept for gradients.
     """
 
     termination: Termination
@@ -48,6 +54,7 @@ class RunResult:
     cpu_time: float
     wall_time: float
     log: str = ""
+    differentiable: DifferentiableRun | None = field(default=None, repr=False, compare=False)
 
     @property
     def data(self) -> RunData:
@@ -57,6 +64,61 @@ class RunResult:
         from bilayer_core.log.run.log_reader import read_log
 
         return read_log(self.log)
+
+    def gradient(self, of: str | Sequence[str], to: str | Sequence[str]) -> Gradient:
+        """Return derivatives of quantities at the end of the run, with the steps that were made.
+
+        Parameters
+        ----------
+        of : str or sequence of str
+            Quantities by the names that logs have: ``"com"``, ``"rod/strip/position"``.
+        to : str or sequence of str
+            Paths of numbers in the scene, or of lists of numbers: ``"stimuli.humidity.schedule.value"``. A run that did
+            not begin at the start of its scene began where it did, whatever they are.
+
+        Returns
+        -------
+        Gradient
+            Arrays by quantity and parameter. `residual` is the largest distance from where Newton's method would have
+            ended a step.
+
+        Raises
+        ------
+        InputError
+            If steps were not kept, there is no such name, a number acts on nothing, or the scene has something through
+            which runs are not differentiated.
+        """
+        return self._kept.gradient(of, to)
+
+    def pull_back(self, seeds: Mapping[str, np.ndarray], to: str | Sequence[str]) -> dict[str, np.ndarray]:
+        """Return the derivatives of Σ seed · quantity at the end of the run by numbers: a vector–Jacobian product.
+
+        It takes about as long for many numbers as for one, where these are gains or stimuli.
+
+        Parameters
+        ----------
+        seeds : mapping of str to ndarray
+            For ``"positions"`` and ``"velocities"`` of nodes, shape (n_node, 3).
+        to : str or sequence of str
+            As in `gradient`.
+
+        Returns
+        -------
+        dict of str to ndarray
+            By the names in `to`.
+
+        Raises
+        ------
+        InputError
+            As in `gradient`.
+        """
+        return self._kept.pull_back(seeds, to)
+
+    @property
+    def _kept(self) -> DifferentiableRun:
+        if self.differentiable is None:
+            raise InputError("gradient: steps of this run were not kept; give run(gradients=True)")
+        return self.differentiable
 
     def plot(self, *quantities: str, **settings: Any) -> Any:
         """Draw quantities of the log over time.

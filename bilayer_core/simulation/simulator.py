@@ -16,7 +16,6 @@ from bilayer_core.engine.energy_account import OPEN, QUESTIONED
 from bilayer_core.errors import InputError
 from bilayer_core.forces.force_register import memory_size
 from bilayer_core.integrators.integrator_register import INTEGRATORS
-from bilayer_core.log.run.quantities import entries
 from bilayer_core.model.build_model import build_model
 from bilayer_core.model.findings import told
 from bilayer_core.model.fingerprint import conditions_of, fingerprint_of
@@ -37,7 +36,9 @@ from bilayer_core.simulation.energy_budget import EnergyLedger
 from bilayer_core.simulation.equilibrium import StaticReport, solve_static
 from bilayer_core.simulation.friction_changes import coefficients
 from bilayer_core.simulation.gains import alike_but_gains, put_gains
-from bilayer_core.simulation.gradient import Equilibrium, Gradient, differentiate
+from bilayer_core.simulation.gradients.derivatives import DifferentiableRun, Gradient, differentiate
+from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
+from bilayer_core.simulation.gradients.nearby import Builders
 from bilayer_core.simulation.momentum import angular_momentum_of, momentum_of
 from bilayer_core.simulation.observation import (
     describe,
@@ -587,6 +588,7 @@ class Simulator:
         progress: Callable[[float], None] | bool = False,
         each_step: Callable[[float], None] | None = None,
         interrupted: Callable[[], bool] | None = None,
+        gradients: bool = False,
     ) -> RunResult:
         """Advance by a duration or to a time (default: to the end of the scene), showing frames to observers.
 
@@ -621,6 +623,8 @@ class Simulator:
             Called with the simulated time [s] after each step, made one by one.
         interrupted : callable, optional
             Asked every few steps, and within long ones; true ends the run, as ``interrupted``, at the last step made.
+        gradients : bool
+            Keep the steps, made one by one, for `RunResult.gradient`.
 
         Returns
         -------
@@ -642,13 +646,20 @@ class Simulator:
 
             output = self.scene.output
             observers = [McapRecorder(log, output.rate, output.marker_rate, overwrite), *observers]
+        differentiable: DifferentiableRun | None = None
+        if gradients:
+            self.compile()
+            differentiable = DifferentiableRun(self._stepper, self._state, self._builders, self.description)
+            each_step = differentiable.keeping(each_step)
         with ExitStack() as bar:
             if progress is True:
                 end = self.time + time_left(self.time, self.scene.duration, duration, until)
                 progress = bar.enter_context(progress_bar(self.scene.name, self.time, end))
             callbacks = Callbacks(stop, interrupted, progress or None, each_step)
             result = self._loop.run(self, duration, until, observers, inputs, callbacks)
-        return result if log is None else replace(result, log=str(log))
+        if log is None and differentiable is None:
+            return result
+        return replace(result, log=str(log or ""), differentiable=differentiable)
 
     def attach(self, observer: Observer) -> Callable[[], None]:
         """Show frames to an observer from now on, at its rate, whoever makes steps.
@@ -693,7 +704,7 @@ class Simulator:
                 self._loop.take_state()
 
     def gradient(self, of: str | Sequence[str], to: str | Sequence[str]) -> Gradient:
-        """Return derivatives of the equilibrium at which the robot is; see `simulation.gradient`.
+        """Return derivatives of the equilibrium at which the robot is; those of runs are `RunResult.gradient`.
 
         Parameters
         ----------
@@ -716,23 +727,22 @@ class Simulator:
         SimulationError
             If the equilibrium is unstable.
         """
-        here = self._equilibrium()
-        asked = [[names] if isinstance(names, str) else list(names) for names in (of, to)]
-        known = [
-            entry.name
-            for entry in entries(self.description, self.energy(), ())
-            if not entry.name.startswith("stimulus/") and not entry.name.endswith("/frame")
-        ]
-        return differentiate(here, known, *asked)
+        return differentiate(self._equilibrium(), of, to)
 
     def _equilibrium(self) -> Equilibrium:
         """Return the equilibrium at which the robot is, with the factor of its Hessian, for studies; see `gradient`."""
         self.compile()
+        return Equilibrium(self._stepper, self._state, self._builders, self.description)
 
-        def model_of(scene: SceneConfig) -> Model:
-            return build_model(scene, self.plan.model, self.plan.dimension)
-
-        return Equilibrium(self._stepper, self._state, model_of, self._stepper_of, self._state_of, self.description)
+    @property
+    def _builders(self) -> Builders:
+        """Makers of models, steppers and states of scenes nearby."""
+        plan, method, steps, most = self.plan, self._method, self.steps, self.scene.solver.max_newton_iterations
+        return Builders(
+            lambda scene: build_model(scene, plan.model, plan.dimension),
+            lambda model: Stepper(model, method, steps, most),
+            self._state_of,
+        )
 
     def save_state(self) -> Array:
         """Return a flat copy of the state; `load_state` continues from it bit for bit.

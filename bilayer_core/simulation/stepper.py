@@ -22,7 +22,15 @@ from bilayer_core.engine.step_size import reach
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.integrators.method import Method
 from bilayer_core.model.model import Model
-from bilayer_core.model.records.status import COLLAPSED, CROSSED, GAINS_ENERGY, INPUTS_END, PAUSED, TOO_INACCURATE
+from bilayer_core.model.records.status import (
+    COLLAPSED,
+    CONVERGED,
+    CROSSED,
+    GAINS_ENERGY,
+    INPUTS_END,
+    PAUSED,
+    TOO_INACCURATE,
+)
 from bilayer_core.model.state import NOT_KNOWN, State
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.simulation.collapse import collapsed
@@ -89,6 +97,8 @@ class Stepper:
     Attributes
     ----------
     surroundings : Surroundings
+    ahead : float
+        By which these reach beyond the present, at least [s].
     same_time : float
         Two times that differ by no more are one [s].
     ledger : EnergyLedger or None
@@ -121,7 +131,8 @@ class Stepper:
         rounding = TIME_ROUNDING if steps.adaptive else FIXED_ROUNDING
         self.same_time = max(first * rounding, LAST_DIGITS * model.scene.duration)
         self._first, self._longest = first, steps.longest if steps.adaptive else steps.dt
-        self.surroundings = Surroundings(model, ahead=2.0 * first)
+        self.ahead = 2.0 * first
+        self.surroundings = Surroundings(model, self.ahead)
         return StepControl(
             dt=0.0 if steps.adaptive else steps.dt,
             order=method.order,
@@ -237,6 +248,21 @@ class Stepper:
         if self.ledger is not None and found.done:
             self.ledger.record(state, self.surroundings.load_factor(state, found.length), found.length)
         return found
+
+    def make_again(self, state: State, end: float, stood_in: bool) -> None:
+        """Make a step to an end [s] by the method, or by what stands in for it, as it was made or would have been.
+
+        Raises
+        ------
+        SimulationError
+            If it cannot be made.
+        """
+        begin = float(state.time[0])
+        self.surroundings.cover(begin, state.override, state.pose_goal)
+        self.engine.actuation = self.surroundings.actuation
+        if self.engine.make_again(state, stood_in, end - begin, self.same_time) != CONVERGED:
+            raise SimulationError("a step cannot be made again", begin)
+        state.time[0] = end
 
     def _integrate(
         self, state: State, until: float, due: float, most: int, interrupted: Callable[[], bool] | None

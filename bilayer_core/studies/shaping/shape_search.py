@@ -29,7 +29,8 @@ from bilayer_core.scene.loader import load_content, load_scene, scene_content
 from bilayer_core.scene.overrides import Overrides
 from bilayer_core.simulation.at_rest import equilibrium_of, take_shape
 from bilayer_core.simulation.gains import alike_but_gains
-from bilayer_core.simulation.gradient import Equilibrium, Parameter
+from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
+from bilayer_core.simulation.gradients.parameters import Parameter
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.studies.shaping.target_curve import TargetCurve, between, read_curve
 from bilayer_core.studies.shaping.varied import Varied, Vary, read_varied

@@ -1,19 +1,24 @@
-"""Derivatives of equilibria, against differences of equilibria that were found anew, and against closed forms."""
+"""Derivatives of equilibria and runs, against differences of those made anew, and against closed forms."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from bilayer_core.scene.loader import load_scene, scene_content
 from bilayer_core.scene.overrides import read_overrides
+from bilayer_core.simulation.at_rest import stepper_and_state
+from bilayer_core.simulation.gradients.nearby import values_of
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.validation_case import Case
 
 TOLERANCE = 1e-14
 """Displacement that counts as rest [m]."""
+TIGHT = {"solver.newton_tolerance": 1e-12}
+"""For runs."""
+Steps = Sequence[tuple[float, bool]]
 STEP = 2e-4
 """Of the parameter: differences are of fourth order."""
 HANGING: dict[str, Any] = {"gravity": [0, 0, -9.81]}
@@ -50,6 +55,58 @@ def height(name: str, overrides: dict[str, Any], stimuli: dict[str, float], to: 
 
         a, b, c, d = map(at, (-1.0, -0.5, 0.5, 1.0))
         return float(here.gradient("com", to)["com", to][2]), (8.0 * (c - b) - (d - a)) / (6.0 * h)
+
+    return measured
+
+
+def end_of_run(
+    name: str, overrides: dict[str, Any], duration: float, to: str, of: str = "com", step: float = 1e-4
+) -> Callable:
+    """Measure how a quantity at the end of a run depends on a parameter: its largest component."""
+
+    def measured() -> tuple[float, float]:
+        run = Simulator(load_scene(name, TIGHT | overrides)).run(duration, gradients=True)
+        found = run.gradient(of, to)[of, to].ravel()
+        (other,) = differences_of_runs(name, overrides, run.differentiable.made, to, step, [of])
+        place = int(np.abs(other).argmax())
+        return float(found[place]), float(other.ravel()[place])
+
+    return measured
+
+
+def differences_of_runs(
+    name: str, overrides: dict[str, Any], steps: Steps, to: str, step: float, of: Sequence[str]
+) -> list[np.ndarray]:
+    """Return differences of quantities at the end of two runs with the steps of another, over the parameter, which
+    is `step` of its value away on either side.
+    """
+    holder, place = read_overrides({to: 0.0})[0].find(scene_content(load_scene(name, overrides)))
+    h, sides = step * (abs(holder[place]) or 1.0), []
+    for way in (-1.0, 1.0):
+        simulator = Simulator(load_scene(name, TIGHT | overrides | {to: holder[place] + way * h}))
+        sides.append(with_steps(simulator, steps, of))
+    return [(high - low) / (2.0 * h) for low, high in zip(*sides, strict=True)]
+
+
+def with_steps(simulator: Simulator, steps: Steps, of: Sequence[str]) -> list[np.ndarray]:
+    """Return quantities at the end of a run with the steps of another run, whatever their errors are."""
+    stepper, state = stepper_and_state(simulator)
+    stepper.evaluate(state)
+    for end, stood_in in steps:
+        stepper.make_again(state, end, stood_in)
+    return values_of(stepper, state, of, simulator.description)
+
+
+def adjoint(name: str, overrides: dict[str, Any], duration: float, to: str) -> Callable:
+    """Measure the derivative of the sum of all coordinates of nodes, back from the end of a run and forward to it."""
+
+    def measured() -> tuple[float, float]:
+        simulator = Simulator(load_scene(name, TIGHT | overrides))
+        run = simulator.run(duration, gradients=True)
+        seeds = {"positions": np.ones((simulator.model.node_count, 3))}
+        response = run.differentiable.response()
+        along = response.forward(response.numbers([to])[to])
+        return float(run.pull_back(seeds, to)[to]), float(along.place[response.nodes, 0].sum())
 
     return measured
 
@@ -100,7 +157,36 @@ TOUCHING = {
     "contact/thickness": ("bending", ON_A_POST, {"swelling": 0.03}, f"{ACTIVE}.thickness"),
     "contact/radius": ("bending", ON_A_POST, {"swelling": 0.03}, "obstacles.post.radius"),
 }
+LEVEL, GAIN = "stimuli.swelling.schedule.to", f"{ACTIVE}.eigenstrain.gain"
+SWELLING = HANGING | {LEVEL: 0.8}
+VISCOUS = {"materials.active.retardation_time": 0.05}
+EULER = {"solver.integrator": "implicit_euler", "solver.dt": 0.004, "solver.tolerance": None}
+RUNS: dict[str, tuple[Any, ...]] = {
+    "stimulus": ("bending", SWELLING, 0.2, LEVEL),
+    "gain in space": ("bending", SWELLING | IN_SPACE, 0.2, GAIN),
+    "modulus, two rods": ("bending", SWELLING | TWO_RODS, 0.1, "materials.active.youngs_modulus"),
+    "thickness": ("bending", SWELLING, 0.2, f"{ACTIVE}.thickness"),
+    "length, implicit euler": ("bending", SWELLING | EULER, 0.1, "rods.strip.path.length", "com", 1e-5),
+    "viscosity": ("bending", SWELLING | VISCOUS, 0.2, "materials.active.retardation_time"),
+    "fibres/gravity": ("chiral_pod", {}, 0.02, "gravity.2"),
+}
 CASES = (
+    *(Case(f"gradients/runs/{name}", "differences of runs", 1e-6, end_of_run(*of)) for name, of in RUNS.items()),
+    Case(
+        "gradients/runs/contact/stimulus",
+        "differences of runs",
+        1e-4,
+        end_of_run("bending", ON_A_POST | {LEVEL: 0.1}, 0.2, LEVEL),
+    ),
+    Case(
+        "gradients/runs/rods that touch/density",
+        "differences of runs",
+        1e-4,
+        end_of_run("knot", {"contact.friction": None}, 0.01, "materials.rubber.density"),
+    ),
+    Case(
+        "gradients/runs/back", "the same forward", 1e-10, adjoint("bending", SWELLING | VISCOUS | IN_SPACE, 0.1, GAIN)
+    ),
     *(Case(f"gradients/{name}", DIFFERENCES, 1e-6, height(*of)) for name, of in ANEW.items()),
     *(Case(f"gradients/{name}", DIFFERENCES, 1e-4, height(*of)) for name, of in TOUCHING.items()),
     Case("gradients/curvature by the stimulus", "Timoshenko's formula", 1e-3, curvature_per_swelling, "1/m"),

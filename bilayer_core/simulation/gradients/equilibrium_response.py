@@ -1,0 +1,344 @@
+"""Derivatives of an equilibrium by stimuli and by numbers of the scene.
+
+At rest the gradient of the potential vanishes, g(q, p) = 0, so that along a parameter
+
+    dq/dp = −H⁻¹ ∂g/∂p,    H = ∂g/∂q
+
+with the factor that Newton's method has. ∂g/∂p is a difference of gradients of the model at p ± h and p ± h/2, which is
+built anew for a number of the scene. What is held at p ± h is the departure of the shape from that at the start: where
+the start moves with p, as with a rod's length, q moves along, and g is differentiated along this path.
+
+The same differences along the whole path, p ± h with q moved by ± h dq/dp, then give what g still changes by. It is
+0 up to errors of H and of the differences; H⁻¹ times it corrects dq/dp. So forces that have no potential (loads that
+turn with the rod, light) count in full though H lacks them, and the last correction tells the error. Quantities are
+differentiated along the same path, whatever they depend on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bilayer_core.engine.evaluator import Evaluator
+from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.model.model import Model
+from bilayer_core.model.state import State
+from bilayer_core.observed.frame import Description
+from bilayer_core.simulation.equilibrium import solve_static
+from bilayer_core.simulation.gains import put_gains
+from bilayer_core.simulation.gradients.nearby import (
+    PLACES,
+    Builders,
+    Motion,
+    Nearby,
+    carry_directors,
+    known_quantities,
+    slope,
+)
+from bilayer_core.simulation.gradients.parameters import (
+    STEP,
+    Parameter,
+    laws_of,
+    numbers_of,
+    scale_of,
+    scene_with,
+)
+from bilayer_core.simulation.stepper import Stepper
+
+Array = np.ndarray
+NEAR_REST = 1e-6
+"""Of the longest rod: displacement that Newton's method may still make at what counts as an equilibrium."""
+OF_GAP = 1e-2
+"""Largest displacement over a step of a parameter, of the smallest gap: barriers are steep."""
+CONVERGED, GOOD, MOST = 1e-9, 1e-4, 20
+"""Of the largest part of dq/dp: the correction that ends them, and the largest last one; how many there may be."""
+NOTHING = 1e-14
+"""Of the longest rod, or of a quantity: change over h that is rounding."""
+RATES = ("velocity", "spin", "strain_rate", "body_velocity", "body_angular_velocity", "has_history", "light_rate")
+HELD = ("time", "director1", "twist", "body_rotation", "memory", "override", "pose_goal", "friction")
+"""Parts of the present state that a model nearby has as well."""
+
+
+@dataclass(frozen=True)
+class Response:
+    """How an equilibrium moves with a parameter.
+
+    Attributes
+    ----------
+    motion : Motion
+        dq/dp.
+    correction : Motion
+        The last one.
+    nearby : list of Nearby
+        At `PLACES`, for the step `h`.
+    moves : bool
+        Whether the shape changes at all.
+    """
+
+    motion: Motion
+    correction: Motion
+    nearby: list[Nearby]
+    h: float
+    moves: bool
+
+
+class Equilibrium:
+    """An equilibrium that is differentiated.
+
+    Parameters
+    ----------
+    stepper : Stepper
+    state : State
+        Near rest; it is left as it is.
+    builders : Builders
+    description : Description
+        Of a run of the stepper's model.
+
+    Attributes
+    ----------
+    residual : float
+        Largest displacement that Newton's method still made at `state` [m].
+
+    Raises
+    ------
+    InputError
+        If the state is not at rest.
+    SimulationError
+        If the equilibrium is unstable.
+    """
+
+    def __init__(
+        self,
+        stepper: Stepper,
+        state: State,
+        builders: Builders,
+        description: Description,
+    ):
+        model, self._description, self._builders = stepper.model, description, builders
+        self._start = builders.state_of(model)
+        self.scene, self._size = model.scene, max(rod.path.length for rod in model.scene.rods)
+        self._gains = model.drives.law_gain.copy()
+        arrays = {name: getattr(model.drives, name) for name in model.drives.names}
+        self.model = replace(model, drives=type(model.drives)(**arrays | {"law_gain": self._gains.copy()}))
+        self._stepper, self._evaluator = builders.stepper_of(self.model), Evaluator(self.model)
+        self._state = state.copy()
+        for part in RATES:
+            getattr(self._state, part).fill(0.0)
+        self._stimulus = stepper.surroundings.stimulus_at(state, float(state.time[0]))
+        self._settle()
+
+    def _settle(self) -> None:
+        """Let Newton's method make its last corrections, and factorise the Hessian there."""
+        self.residual = math.inf
+        for last in (False, False, True):
+            here = self._here(self._stimulus, self._gains)
+            gradient, stable = here.factorise()
+            if not stable:
+                reason = "the shape is unstable: no equilibrium, call solve_static first, or one that no robot keeps to"
+                raise SimulationError(f"gradient: {reason}", float(self._state.time[0]))
+            correction = self._solved(gradient)
+            self.residual = min(self.residual, self.displacement(correction))
+            if not self.residual <= NEAR_REST * self._size:
+                raise InputError(
+                    f"gradient: the robot is not at rest: Newton's method would still move it by {self.residual:.3g} "
+                    f"m, allowed are {NEAR_REST * self._size:.3g} m; call solve_static first"
+                )
+            if not last:
+                self._state = here.moved(correction)
+        self._farthest = min(STEP * self._size, OF_GAP * self._evaluator.gap)
+
+    @property
+    def known(self) -> Collection[str]:
+        """Names of quantities that may be differentiated."""
+        return known_quantities(self._stepper, self._state, self._description)
+
+    @property
+    def positions(self) -> Array:
+        """Positions of nodes [m], shape (n_node, 3)."""
+        return self._state.position
+
+    @property
+    def gains(self) -> Array:
+        """Those of laws, a copy, shape (n_law,)."""
+        return self._gains.copy()
+
+    def fits(self, model: Model) -> bool:
+        """Return whether states of a model have the same unknowns."""
+        return model.layout.size == self.model.layout.size and _shapes(self._builders.state_of(model)) == _shapes(
+            self._state
+        )
+
+    def write_shape(self, state: State) -> None:
+        """Give a state of the same model, or of one with other numbers, the shape, the stimuli and the loads."""
+        for part in ("position", "body_position", *HELD):
+            getattr(state, part)[:] = getattr(self._state, part)
+
+    def go_to(self, gains: Array) -> None:
+        """Go to the equilibrium with other gains of laws, shape (n_law,).
+
+        Raises
+        ------
+        SimulationError
+            If there is none; nothing is changed then.
+        """
+        before, state = self._gains.copy(), self._state.copy()
+        try:
+            self._gains[:] = gains
+            put_gains(self.model, gains)
+            solve_static(self._stepper, self._state)
+            self._settle()
+        except SimulationError:
+            self._gains[:], self._state = before, state
+            self._settle()
+            raise
+
+    def velocities(self, parameters: Sequence[Parameter]) -> Array:
+        """Return dx/dp of nodes by each parameter from one difference each: exact where forces are linear in it, as in
+        gains, shape (n_node, 3, n_parameter).
+        """
+        here = self._here(self._stimulus, self._gains)
+        gradient, columns = here.gradient(here.state), []
+        places, gains = self.model.layout.node[:, None] + np.arange(3), here.gradients_by_gains()
+        for parameter in parameters:
+            h, shift = STEP * parameter.scale, 0.0
+            if parameter.laws.size:
+                changed = self._gains.copy()
+                changed[parameter.laws] += h
+                other = gains(changed)
+            else:
+                near = parameter.at(parameter.value + h)
+                other, shift = near.gradient(near.state), near.state.position - self._state.position
+            motion = self._solved((other + gradient * -1.0) * (1.0 / h))
+            columns.append(motion.unknowns[places] + shift / h)
+        put_gains(self.model, self._gains)
+        return np.stack(columns, axis=-1)
+
+    def _here(self, stimulus: Array, gains: Array) -> Nearby:
+        """Return the present model with other stimuli or gains."""
+        return Nearby(self._stepper, self._evaluator, self._state.copy(), stimulus, gains, self._description)
+
+    def _with(self, path: str, value: float) -> Nearby:
+        """Return the model with another number in its scene."""
+        model = self._builders.model_of(scene_with(self.scene, path, value))
+        stepper = self._builders.stepper_of(model)
+        state = self._carried(model)
+        if state is None:
+            raise InputError(f"gradient: {path} changes how many unknowns the model has")
+        stimulus = stepper.surroundings.stimulus_at(state, float(state.time[0]))
+        return Nearby(stepper, Evaluator(model), state, stimulus, None, self._description)
+
+    def _carried(self, model: Model) -> State | None:
+        """Return the state of another model that departs from its start as the present one does."""
+        state, here, start = self._builders.state_of(model), self._state, self._start
+        if not self.fits(model):
+            return None
+        turned = state.body_rotation @ start.body_rotation.swapaxes(1, 2)
+        same = np.array_equal(state.body_rotation, start.body_rotation)
+        for part in ("position", "body_position"):
+            mine = getattr(state, part)
+            mine[:] = getattr(here, part) + (mine - getattr(start, part))
+        for part in HELD:
+            getattr(state, part)[:] = getattr(here, part)
+        if not same:
+            state.body_rotation[:] = turned @ here.body_rotation
+        carry_directors(model, here.position, state)
+        return state
+
+    def _solved(self, gradient: Motion) -> Motion:
+        """Return minus the inverse of the Hessian times a gradient."""
+        return Motion(*self._evaluator.newton_step(gradient.unknowns, gradient.bodies))
+
+    def displacement(self, motion: Motion) -> float:
+        """Return the largest displacement in a motion [m]; angles count with the longest rod as their radius."""
+        places = self.model.layout.node[:, None] + np.arange(3)
+        lengths = np.linalg.norm(motion.unknowns[places], axis=1).max()
+        turns = [motion.unknowns[self.model.rods.edge_unknown], motion.bodies[:, 3:].ravel()]
+        angle = max((np.abs(part).max(initial=0.0) for part in turns), default=0.0)
+        return float(max(lengths, np.abs(motion.bodies[:, :3]).max(initial=0.0), self._size * angle))
+
+    def parameters(self, names: Sequence[str]) -> dict[str, list[Parameter]]:
+        """Return parameters by the names that users give them: one, or those of a list of numbers.
+
+        Raises
+        ------
+        InputError, SceneError
+            If there is no such channel or path, or it has no numbers.
+        """
+        found = {name: list(self._parameters_of(name)) for name in names}
+        numbers = [(p.name, p.value) for of in found.values() for p in of]
+        laws = laws_of(self.model, self._builders.model_of, numbers)
+        return {
+            name: [self._of_laws(p, laws[p.name]) if p.name in laws else p for p in of] for name, of in found.items()
+        }
+
+    def _parameters_of(self, name: str) -> Iterator[Parameter]:
+        channels = list(self.scene.stimuli)
+        if name in channels:
+            k, channel = channels.index(name), self.scene.stimuli[name]
+
+            def driven(value: float) -> Nearby:
+                stimulus = self._stimulus.copy()
+                stimulus[k] = value
+                return self._here(stimulus, self._gains)
+
+            yield Parameter(name, float(self._stimulus[k]), channel.maximum - channel.minimum, driven)
+            return
+        for path, value in numbers_of(self.scene, name):
+            yield Parameter(path, value, scale_of(value), lambda value, path=path: self._with(path, value))
+
+    def _of_laws(self, parameter: Parameter, laws: Array) -> Parameter:
+        """Return a parameter that is the gain of laws, for which nothing is built."""
+
+        def gained(value: float) -> Nearby:
+            gains = self._gains.copy()
+            gains[laws] = value
+            return self._here(self._stimulus, gains)
+
+        return replace(parameter, at=gained, laws=laws)
+
+    def respond(self, parameter: Parameter) -> Response:
+        """Return how the equilibrium moves with a parameter.
+
+        Raises
+        ------
+        SimulationError
+            If the corrections do not get small.
+        """
+        h = STEP * parameter.scale
+        while True:
+            nearby = [parameter.at(parameter.value + place * h) for place in PLACES]
+            gradients = [of.gradient(of.state) for of in nearby]
+            motion = self._solved(slope(gradients, h))
+            shift = max(np.abs(of.state.position - self._state.position).max() for of in nearby)
+            travel = shift + h * self.displacement(motion)
+            if travel <= self._farthest:
+                break
+            h *= max(0.5 * self._farthest / travel, 1e-3) if math.isfinite(travel) else 1e-3
+            if h < NOTHING * parameter.scale:
+                raise self._failure(parameter, travel)
+        correction, moves = motion, travel > NOTHING * self._size
+        before = math.inf
+        for _ in range(MOST if moves else 0):
+            shapes = [of.moved(motion * (place * h)) for of, place in zip(nearby, PLACES, strict=True)]
+            correction = self._solved(slope([of.gradient(s) for of, s in zip(nearby, shapes, strict=True)], h))
+            part = self.displacement(correction) / self.displacement(motion)
+            if not part < before:
+                break
+            motion, before = motion + correction, part
+            if part <= CONVERGED:
+                break
+        if moves and not before <= GOOD:
+            raise self._failure(parameter, before)
+        return Response(motion, correction, nearby, h, moves)
+
+    def _failure(self, parameter: Parameter, left: float) -> SimulationError:
+        reason = f"{parameter.name}: corrections do not get small ({left:.3g} of the whole is left)"
+        remedy = "the equilibrium is about to become unstable, or its forces depend on it in jumps"
+        return SimulationError(f"gradient: {reason}; {remedy}", float(self._state.time[0]))
+
+
+def _shapes(state: State) -> list[tuple[int, ...]]:
+    return [getattr(state, part).shape for part in ("position", "body_position", *HELD)]

@@ -1,0 +1,99 @@
+"""Numbers by which is differentiated: paths in the scene, lists of them, and gains, which need no new model."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bilayer_core.errors import InputError, SceneError
+from bilayer_core.model.model import Model
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.loader import load_content, scene_content
+from bilayer_core.scene.overrides import read_overrides
+from bilayer_core.simulation.gains import alike_but_gains
+from bilayer_core.simulation.gradients.nearby import Nearby
+
+Array = np.ndarray
+STEP = 1e-3
+"""h of a parameter, over its size, and the largest displacement over it, of the longest rod."""
+_GAIN = re.compile(r".*\.eigenstrain(\.\d+)?\.gain(\.value\.\d+)?")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number by which an equilibrium is differentiated.
+
+    Attributes
+    ----------
+    name : str
+    value : float
+    scale : float
+        What its steps are parts of.
+    at : callable
+        Returns the model nearby at a value.
+    laws : ndarray
+        The laws whose gain it is, if nothing is built for it.
+    """
+
+    name: str
+    value: float
+    scale: float
+    at: Callable[[float], Nearby]
+    laws: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+
+def numbers_of(scene: SceneConfig, name: str) -> Iterator[tuple[str, float]]:
+    """Yield the path and the value of a number of the scene, or of each in a list of numbers.
+
+    Raises
+    ------
+    InputError, SceneError
+        If there is no such path, or it has no numbers.
+    """
+    try:
+        change = read_overrides({name: 0.0})[0]
+        holder, place = change.find(scene_content(scene))
+    except SceneError as error:
+        told = str(error).partition(": ")[2]
+        channel = f"; channels of stimuli are {', '.join(scene.stimuli)}" if scene.stimuli else ""
+        raise SceneError(f"gradient: {name}: {told}{channel}") from error
+    held = holder[place]
+    of_list = isinstance(held, list) and bool(held) and all(isinstance(v, float | int) for v in held)
+    for end, value in ((f".{k}", v) for k, v in enumerate(held)) if of_list else (("", held),):
+        if isinstance(value, bool) or not isinstance(value, float):
+            kind = "a whole number" if type(value) is int else "no number"
+            raise InputError(f"gradient: {name} is {kind} in this scene, by which nothing can be differentiated")
+        yield name + end, value
+
+
+def scene_with(scene: SceneConfig, path: str, value: float) -> SceneConfig:
+    """Return a scene with another number."""
+    try:
+        return load_content(scene_content(scene), {path: value})
+    except SceneError as error:
+        raise SceneError(f"gradient: {path} cannot be varied about its value, to {value:.9g}: {error}") from error
+
+
+def scale_of(value: float) -> float:
+    """Return what steps of a number of the scene are parts of."""
+    return abs(value) or 1.0
+
+
+def laws_of(model: Model, model_of: Callable[[SceneConfig], Model], numbers: Sequence[tuple[str, float]]) -> dict:
+    """Return which laws each gain among some numbers is that of, shape (n,), by its path, where nothing else of the
+    model depends on it.
+    """
+    gains = [(path, value) for path, value in numbers if _GAIN.fullmatch(path)]
+    if not gains:
+        return {}
+    changed = {path: value + STEP * (1.0 + k / len(gains)) * scale_of(value) for k, (path, value) in enumerate(gains)}
+    other = model_of(load_content(scene_content(model.scene), changed))
+    if not alike_but_gains(model, other):
+        return {}
+    laws = {path: np.flatnonzero(other.drives.law_gain == value) for path, value in changed.items()}
+    moved = np.flatnonzero(other.drives.law_gain != model.drives.law_gain)
+    told = np.sort(np.concatenate(list(laws.values())))
+    return laws if np.array_equal(told, moved) and all(of.size for of in laws.values()) else {}

@@ -1,0 +1,482 @@
+"""How the end of a run depends on numbers of its scene, with the steps that were made.
+
+Derivatives go along with the steps (`forward`), or come back from the end (`backward`); see `gradients.step_rates`.
+What a number changes by itself, where each stage ended, is a difference of models, as for equilibria: gains and stimuli
+act through the laws of materials alone, and need none. Lengths of steps count as given: so derivatives are those of
+what was computed.
+
+With a number such as a thickness, layers that were alike become unlike, and their masses are off the curve. Rates of
+directors, which count then, are those that the directors of the steps have.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.model.model import Model
+from bilayer_core.model.state import PARTS, State
+from bilayer_core.observed.frame import Description
+from bilayer_core.simulation.gains import put_gains
+from bilayer_core.simulation.gradients.course import Course
+from bilayer_core.simulation.gradients.nearby import (
+    PLACES,
+    Builders,
+    carry_directors,
+    described,
+    known_quantities,
+    slope,
+    values_of,
+)
+from bilayer_core.simulation.gradients.parameters import STEP, laws_of, numbers_of, scale_of, scene_with
+from bilayer_core.simulation.gradients.step_again import KeptStep, Reached, StepAgain
+from bilayer_core.simulation.gradients.step_rates import Inputs, Rates, StepRates
+from bilayer_core.simulation.same_model import differing
+from bilayer_core.simulation.settling import SETTLE
+from bilayer_core.simulation.stepper import Stepper
+from bilayer_core.simulation.surroundings import Surroundings
+
+Array = np.ndarray
+DIFFERENTIATED = {
+    "stretching",
+    "bending",
+    "twisting",
+    "flattening",
+    "bond",
+    "viscosity",
+    "inertia",
+    "damping",
+    "gravity",
+    "loads",
+    "barrier",
+    "rod barrier",
+    "gyroscopic",
+}
+"""Forces through which runs are differentiated."""
+SEEDS = ("positions", "velocities")
+"""By which a derivative comes back from the end of a run."""
+AT_END = ("strain_rate", "reached", "strain_push")
+"""Rates that a number changes by itself at the end of a step."""
+NEAR = 1e-5
+"""h of a number, over its size, where barriers are steep."""
+
+
+@dataclass
+class Direct:
+    """Changes by a number alone in a step: of inputs, of the gradient where stages ended, and of the end.
+
+    Arrays are columns of `Inputs` and `Rates`; `next_rates` are `Number.rates` at the end of the step.
+    """
+
+    first: Array
+    stimulus: Array
+    gain: Array
+    gradient: list[Array]
+    strain_rate: Array
+    reached: Array
+    strain_push: Array
+    next_rates: list[tuple[Array, Array]] | None = None
+
+
+@dataclass
+class Number:
+    """A number by which a run is differentiated.
+
+    Attributes
+    ----------
+    path : str
+    value, scale : float
+    laws : ndarray
+        Of which it is the gain.
+    around : list of Surroundings
+        Other stimuli, with it at `PLACES`, where it changes nothing else.
+    agains : list of StepAgain
+        Of models with it there.
+    own : bool
+        Whether their models are others.
+    rates : list of tuple or None
+        Rates of strains of each of these models at the start of the next step, and theirs, where only they have some.
+    """
+
+    path: str
+    value: float
+    scale: float
+    laws: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    around: list[Surroundings] = field(default_factory=list)
+    agains: list[StepAgain] = field(default_factory=list)
+    own: bool = False
+    rates: list[tuple[Array, Array]] | None = None
+
+
+class RunResponse:
+    """The steps of a run that are differentiated.
+
+    Parameters
+    ----------
+    course : Course
+    stepper : Stepper
+        Of the run; nothing of it is changed.
+    builders : Builders
+    description : Description
+        Of the run.
+
+    Raises
+    ------
+    InputError
+        If no step was kept, or the scene has something through which runs are not differentiated.
+    """
+
+    def __init__(
+        self,
+        course: Course,
+        stepper: Stepper,
+        builders: Builders,
+        description: Description,
+    ):
+        self._course, self._stepper, self._description = course, stepper, description
+        self._builders = builders
+        self.model, self.scene = stepper.model, stepper.model.scene
+        if not len(course):
+            raise InputError("gradient: no step of a run was kept; call run(gradients=True) first")
+        self._refuse()
+        methods = stepper.engine.methods
+        self._step = NEAR if "barrier" in self.model.forces or "rod barrier" in self.model.forces else STEP
+        self._stages = max(len(method.couplings) for method in methods)
+        self._history = len(methods) > 1 or bool(methods[0].history)
+        self._size = max(rod.path.length for rod in self.scene.rods)
+        agains = [self._again(self.model) for _ in range(self._stages)]
+        self._rates = StepRates(self.model, agains)
+        self._here = agains[0]
+        self._maker = builders.stepper_of(self.model)
+        self._from_start = self._begins_at_start()
+
+    def _refuse(self) -> None:
+        """Refuse what is not differentiated, by its name."""
+        model = self.model
+        others = [name for name in model.forces if name not in DIFFERENTIATED]
+        reasons = [f"the force {name!r}" for name in others]
+        if model.free_count:
+            reasons.append("free bodies")
+        if len(model.joins.first):
+            reasons.append("closed rods")
+        if any(
+            len(method.couplings) > len(method.nodes) or method.couplings.shape[0] > method.couplings.shape[1]
+            for method in self._stepper.engine.methods
+        ):
+            reasons.append("an integrator whose steps end beyond their last stage")
+        if self.scene.start == SETTLE:
+            reasons.append("a start that settles")
+        problem = self._stepper.engine.problem
+        if problem.light.exists:
+            reasons.append("light")
+        if problem.varied_fields.exists:
+            reasons.append("diffusion that varies with what it brings")
+        if "flattening" in model.forces and "viscosity" in model.forces:
+            reasons.append("viscosity of strips")
+        if reasons:
+            raise InputError(f"gradient: a run is not differentiated through {', '.join(reasons)}")
+
+    def _again(self, model: Model, surroundings: Surroundings | None = None) -> StepAgain:
+        around = surroundings or Surroundings(model, self._stepper.ahead)
+        return StepAgain(model, around, self._stepper.same_time, self._stages, self._history)
+
+    def _begins_at_start(self) -> bool:
+        """Return whether the run began at the start of its scene, which depends on the scene's numbers."""
+        own, start = self._builders.state_of(self.model), self._course.start
+        parts = ("time", "position", "velocity", "director1", "spin", "transduction")
+        return all(np.array_equal(getattr(own, part), getattr(start, part)) for part in parts)
+
+    @property
+    def nodes(self) -> Array:
+        """Rows of positions and velocities of nodes in `Rates`, shape (n_node, 3)."""
+        return self._here.of_nodes
+
+    @property
+    def known(self) -> Collection[str]:
+        """Names of quantities that may be differentiated."""
+        return known_quantities(self._maker, self._course.end, self._description)
+
+    # numbers
+
+    def numbers(self, names: Sequence[str]) -> dict[str, list[Number]]:
+        """Return numbers by the names that users give them: one, or those of a list.
+
+        Raises
+        ------
+        InputError, SceneError
+            If there is no such path, or it has no numbers.
+        """
+        for name in names:
+            if name in self.scene.stimuli:
+                path = f"stimuli.{name}.schedule"
+                raise InputError(f"gradient: {name} varies in a run; name a number of its schedule, {path}. …")
+        paths = {name: list(numbers_of(self.scene, name)) for name in names}
+        laws = laws_of(self.model, self._builders.model_of, [number for of in paths.values() for number in of])
+        return {name: [self._number(path, value, laws.get(path)) for path, value in of] for name, of in paths.items()}
+
+    def _number(self, path: str, value: float, laws: Array | None) -> Number:
+        found = Number(path, value, scale_of(value))
+        if laws is not None:
+            found.laws = laws
+            return found
+        scenes = [scene_with(self.scene, path, value + place * self._step * found.scale) for place in PLACES]
+        if all(not differing(self.scene, scene) for scene in scenes):
+            models = [replace(self.model, scene=scene) for scene in scenes]
+            around = [Surroundings(model, self._stepper.ahead) for model in models]
+            if path.startswith("stimuli."):
+                found.around = around
+                return found
+            found.agains = [self._again(model, of) for model, of in zip(models, around, strict=True)]
+        else:
+            found.agains, found.own = [self._again(self._builders.model_of(scene)) for scene in scenes], True
+            raised = [of.problem.raised.edge for of in (found.agains[0], self._here)]
+            if found.agains[0].end_rates.size != self._here.end_rates.size or not np.array_equal(*raised):
+                states = [self._builders.state_of(again.model) for again in found.agains]
+                found.rates = [(state.strain_rate, state.strain_acceleration) for state in states]
+        if any(
+            again.size != self._here.size or again.model.node_count != self.model.node_count for again in found.agains
+        ):
+            raise InputError(f"gradient: {path} changes how many unknowns the model has")
+        return found
+
+    def _start(self, number: Number) -> tuple[Array, ...]:
+        """Return how the start of the run depends on a number: place, speed, rate of strains, what modes reached."""
+        here = self._here
+        place, speed = np.zeros(here.size), np.zeros(here.size)
+        own = self._course.start
+        if not self._from_start or number.laws.size:
+            return place, speed, 0.0 * own.strain_rate, 0.0 * own.transduction
+        h = self._step * number.scale
+        states = [self._builders.state_of(of.model) for of in number.agains or number.around]
+
+        def rate(part: str) -> Array:
+            return slope([getattr(state, part) for state in states], h)
+
+        place[here.of_nodes] = rate("position")
+        director, first = own.director1, self.model.rods.edge_node
+        tangent = own.position[first + 1] - own.position[first]
+        tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+        if not self.model.plane.exists:
+            place[here.of_edges] = np.einsum("ki,ki->k", np.cross(tangent, director), rate("director1"))
+            speed[here.of_edges] = rate("spin")
+        speed[here.of_nodes] = rate("velocity")
+        rates = rate("strain_rate") if number.rates is None else np.zeros(here.end_rates.size)
+        return self._rates.constants.free @ place, speed, rates, rate("transduction")
+
+    def _direct(self, number: Number, step: KeptStep, reached: Sequence[Reached]) -> Direct:
+        """Return what a number changes by itself in a step."""
+        here, h, count = self._here, self._step * number.scale, len(reached)
+        none = Inputs.zeros(here, count, 1)
+        found = Direct(
+            none.first[:, 0],
+            none.stimulus[:, :, 0],
+            none.gain[:, 0],
+            [],
+            np.zeros(here.end_rates.size),
+            np.zeros(here.transduction.size),
+            np.zeros(here.end_rates.size),
+        )
+        if number.laws.size:
+            found.gain[number.laws] = 1.0
+        elif number.around:
+            firsts, stimuli = zip(*(self._inputs(around, step, count) for around in number.around), strict=True)
+            found.first, found.stimulus = slope(firsts, h), slope(stimuli, h)
+        else:
+            own = number.rates or [None] * len(number.agains)
+            seen = [
+                self._replayed(again, replace(step, start=self._fitted(again, step.start, rates)), reached)
+                for again, rates in zip(number.agains, own, strict=True)
+            ]
+            *found.gradient, reached_by, rates, push = (slope(values, h) for values in zip(*seen, strict=True))
+            found.reached = reached_by
+            if number.rates is None:
+                found.strain_rate, found.strain_push = rates, push
+            else:
+                found.next_rates = [(values[-2], values[-1]) for values in seen]
+        return found
+
+    def _inputs(self, around: Surroundings, step: KeptStep, count: int) -> tuple[Array, Array]:
+        """Return the stimuli at the start of a step and at its stages under other schedules."""
+        here, own = self._here, self._here.surroundings
+        here.surroundings = around
+        here.begin(step)
+        here.surroundings = own
+        return here.inputs.first.copy(), here.inputs.stimulus[:count].copy()
+
+    def _replayed(self, again: StepAgain, step: KeptStep, reached: Sequence[Reached]) -> list[Array]:
+        """Return the gradients where stages ended, with another model, and what the state takes of the end."""
+        again.begin(step)
+        gradients = []
+        for n, place in enumerate(reached):
+            again.start(n)
+            again.go(n, place)
+            gradients.append(again.gradient(n))
+            again.finish(n)
+        carry = step.method.carry
+        push = (again.end_rates - again.origin_rates) / again.stage.momentum_length
+        if self._history:
+            push = (push - carry * step.start.strain_acceleration) / (1.0 - carry)
+            if not step.method.history:
+                push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
+        return [*gradients, again.transduction.copy(), again.end_rates.copy(), push]
+
+    def _fitted(self, again: StepAgain, state: State, rates: tuple[Array, Array] | None) -> State:
+        """Return a state that a model with another number takes: with what only such models have, prescribed bodies
+        where they are then, and with them the nodes that bodies hold.
+        """
+        model = again.model
+        fitted = self._builders.state_of(model)
+        for name in PARTS:
+            mine, part = getattr(fitted, name), getattr(state, name)
+            if mine.shape == part.shape:
+                mine[...] = part
+        if rates is not None:
+            fitted.strain_rate[:] = rates[0]
+            if self._history:
+                fitted.strain_acceleration[:] = rates[1]
+        again.begin(KeptStep(fitted, fitted, self._stepper.engine.methods[0]))
+        moved, constrained = again.problem.bodies.prescribed, again.problem.constrained
+        moved = moved[moved < len(fitted.body_position)]
+        for name, part in (("body_position", "position"), ("body_rotation", "rotation")):
+            getattr(fitted, name)[moved] = getattr(again.inputs, part)[0, moved]
+        held = again.places[0]
+        again.take_state(fitted, held)
+        fitted.position[:] = held.position
+        moving = again.inputs.rates[0, constrained.body]
+        fitted.velocity[constrained.node] = moving[:, :3] + np.cross(moving[:, 3:], held.arm)
+        carry_directors(model, state.position, fitted)
+        return fitted
+
+    # derivatives
+
+    @property
+    def residual(self) -> float:
+        """Largest distance of where a step ended from where Newton's method would have ended [m]."""
+        return self._left
+
+    def forward(self, numbers: Sequence[Number]) -> Rates:
+        """Return how the last state depends on some numbers, a column each."""
+        rates, count = self._rates, len(numbers)
+        along = Rates.zeros(self._here, count)
+        for k, number in enumerate(numbers):
+            along.place[:, k], along.speed[:, k], along.strain_rate[:, k], along.reached[:, k] = self._start(number)
+        self._left = 0.0
+        for step in self._course.steps(self._maker):
+            reached = rates.take(step)
+            self._note(step, reached)
+            direct = [self._direct(number, step, reached) for number in numbers]
+            acts = Inputs(
+                np.stack([of.first for of in direct], axis=-1),
+                np.stack([of.stimulus for of in direct], axis=-1),
+                np.stack([of.gain for of in direct], axis=-1),
+            )
+            for number, own in zip(numbers, direct, strict=True):
+                number.rates = own.next_rates
+            none = np.zeros(self._here.size)
+            gradients = [
+                np.stack([of.gradient[n] if of.gradient else none for of in direct], axis=-1)
+                for n in range(len(reached))
+            ]
+            along = rates.forward(along, acts, gradients)
+            for part in AT_END:
+                getattr(along, part)[:] += np.stack([getattr(of, part) for of in direct], axis=-1)
+            self._look_at(along, step)
+        return along
+
+    def _note(self, step: KeptStep, reached: Sequence[Reached]) -> None:
+        self._left = max(self._left, float(np.abs(reached[-1].position - step.end.position).max()))
+
+    def _look_at(self, along: Rates, step: KeptStep) -> None:
+        """Refuse to go on where a motion has forgotten its start."""
+        largest = np.abs(along.place[self._here.of_nodes]).max(initial=0.0)
+        if not math.isfinite(largest):
+            raise SimulationError("gradient: derivatives grow beyond all numbers", step.begin)
+
+    def backward(self, seeds: Mapping[str, Array], numbers: Sequence[Number]) -> list[float]:
+        """Return the derivative by each number of Σ seed · quantity at the end of the run."""
+        rates, here, free = self._rates, self._here, self._rates.constants.free
+        back = Rates.zeros(here, 1)
+        nodes = self.model.node_count
+        for name, seed in seeds.items():
+            given = np.asarray(seed, dtype=float)
+            if name not in SEEDS or given.shape != (nodes, 3) or not np.isfinite(given).all():
+                raise InputError(
+                    f"gradient: {name} of shape {given.shape} is not allowed; allowed are "
+                    f"{' and '.join(SEEDS)} of nodes, finite, shape ({nodes}, 3)"
+                )
+            (back.place if name == SEEDS[0] else back.speed)[here.of_nodes, 0] = given
+        back.place, back.speed = free @ back.place, free @ back.speed
+        begun = self._rates_at_starts([number for number in numbers if number.rates is not None])
+        found = np.zeros(len(numbers))
+        for step in self._course.steps(self._maker, backward=True):
+            reached = rates.take(step)
+            end = back
+            back, acts, direct = rates.backward(end)
+            for number, rates_at_starts in begun:
+                number.rates = rates_at_starts.pop()
+            for k, number in enumerate(numbers):
+                own = self._direct(number, step, reached)
+                found[k] += own.first @ acts.first[:, 0] + own.gain @ acts.gain[:, 0]
+                found[k] += np.vdot(own.stimulus, acts.stimulus[:, :, 0])
+                found[k] += sum(g @ d[:, 0] for g, d in zip(own.gradient, direct, strict=False))
+                for part in AT_END:
+                    found[k] += getattr(own, part) @ getattr(end, part)[:, 0]
+        for k, number in enumerate(numbers):
+            starts = zip(self._start(number), (back.place, back.speed, back.strain_rate, back.reached), strict=True)
+            found[k] += sum(float(own @ by[:, 0]) for own, by in starts)
+        return found.tolist()
+
+    def _rates_at_starts(self, numbers: Sequence[Number]) -> list[tuple[Number, list]]:
+        """Return the rates of strains that only models with some numbers have, at the start of each step."""
+        begun: list[tuple[Number, list]] = [(number, []) for number in numbers]
+        for step in self._course.steps(self._maker) if begun else ():
+            reached = self._rates.take(step)
+            for number, rates_at_starts in begun:
+                rates_at_starts.append(number.rates)
+                number.rates = self._direct(number, step, reached).next_rates
+        return begun
+
+    def values(self, number: Number, along: Rates, k: int, wanted: Sequence[str]) -> tuple[list[Array], list[Array]]:
+        """Return the derivatives of quantities at the end of the run along column k, and the sizes of their errors."""
+        moved = np.abs(along.place[self._here.of_nodes, k]).max(initial=0.0)
+        turned = self._size * np.abs(along.place[self._here.of_edges, k]).max(initial=0.0)
+        largest = max(float(moved), float(turned))
+        h = min(self._step * number.scale, STEP * self._size / largest) if largest > 0.0 else self._step * number.scale
+        rows = [self._values_at(number, along, k, place * h, wanted) for place in PLACES]
+        columns = list(zip(*rows, strict=True))
+        fine = [slope(values, h) for values in columns]
+        rough = [(values[2] - values[1]) / h for values in columns]
+        return fine, [np.abs(one - other) for one, other in zip(fine, rough, strict=True)]
+
+    def _values_at(self, number: Number, along: Rates, k: int, way: float, wanted: Sequence[str]) -> list[Array]:
+        """Return quantities at the end of the run where a number is another."""
+        model = self.model
+        if number.own:
+            model = self._builders.model_of(scene_with(self.scene, number.path, number.value + way))
+        elif not number.laws.size:
+            model = replace(model, scene=scene_with(self.scene, number.path, number.value + way))
+        stepper, evaluator = self._builders.stepper_of(model), self._again(model)
+        state = self._fitted(evaluator, self._course.end, number.rates and number.rates[0])
+        at, there = evaluator.new(), evaluator.new()
+        evaluator.take_state(state, at)
+        no_bodies = np.zeros_like(evaluator.problem.system.body_step)
+        evaluator.move(at, way * along.place[:, k], no_bodies, there)
+        evaluator.write_shape(there, state)
+        state.velocity += way * along.speed[self._here.of_nodes, k]
+        state.spin += way * along.speed[self._here.of_edges, k]
+        if number.rates is None:
+            state.strain_rate += way * along.strain_rate[:, k]
+        state.transduction += way * along.reached[:, k]
+        gains = model.drives.law_gain.copy()
+        try:
+            if number.laws.size:
+                changed = gains.copy()
+                changed[number.laws] = number.value + way
+                put_gains(model, changed)
+            return values_of(stepper, state, wanted, described(self._description, stepper))
+        finally:
+            put_gains(model, gains)

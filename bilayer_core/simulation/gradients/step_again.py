@@ -1,0 +1,218 @@
+"""Steps that were made, once more: the same pieces, to configurations that are known.
+
+A kept step has the states at both ends. Of a method without a history that begins with derivatives, positions of all
+its stages follow from these; Newton's method then makes corrections that the rounding of positions asks for.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from bilayer_core.engine.evaluator import Evaluator
+from bilayer_core.engine.step_ends import end_stage
+from bilayer_core.engine.steps_again import begin_stage, begin_step
+from bilayer_core.errors import SimulationError
+from bilayer_core.model.model import Model
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.step import Configuration, Method
+from bilayer_core.model.state import State
+from bilayer_core.simulation.edge_space import turn_between
+from bilayer_core.simulation.surroundings import Surroundings
+
+Array = np.ndarray
+MOST = 12
+"""Corrections of a stage."""
+ENOUGH = 1e-13
+"""Of the longest rod: a last correction."""
+
+
+@dataclass(frozen=True)
+class KeptStep:
+    """A step that was made.
+
+    Attributes
+    ----------
+    start, end : State
+        Before and after; what is set from outside is as it acted.
+    method : Method
+    """
+
+    start: State
+    end: State
+    method: Method
+
+    @property
+    def begin(self) -> float:
+        """Time at its start [s]."""
+        return float(self.start.time[0])
+
+    @property
+    def length(self) -> float:
+        """Duration [s]."""
+        return float(self.end.time[0]) - self.begin
+
+
+@dataclass(frozen=True)
+class Reached:
+    """Where a stage ended: positions of nodes, shape (n_node, 3), and turns of edges from its first guess, shape
+    (n_edge,).
+    """
+
+    position: Array
+    turn: Array
+
+
+class StepAgain(Evaluator):
+    """Makes kept steps again, without contact of friction, free bodies and fluids.
+
+    Parameters
+    ----------
+    model : Model
+    surroundings : Surroundings
+        What acts on it.
+    same : float
+        Two times that differ by no more are one [s].
+    stages : int
+        Of a step, at most.
+    history : bool
+        Whether the integrator keeps stage derivatives.
+
+    Attributes
+    ----------
+    places : list of Configuration
+        The start of the step, then the end of each stage.
+    guesses : list of Configuration
+        Where Newton's method began in each stage.
+    """
+
+    def __init__(self, model: Model, surroundings: Surroundings, same: float, stages: int, history: bool):
+        super().__init__(model, stages, history)
+        self.surroundings, self._same = surroundings, same
+        self.places: list[Configuration] = [self.new() for _ in range(stages + 1)]
+        self.guesses: list[Configuration] = [self.new() for _ in range(stages)]
+        self._spare = self.new()
+        self._size = max(rod.path.length for rod in model.scene.rods)
+        layout = self.problem.strands
+        self.of_nodes = layout.node_unknown[:, None] + np.arange(3)
+        self.of_edges = layout.edge_unknown
+        self.size = len(self.sums.gradient)
+
+    def begin(self, step: KeptStep) -> None:
+        """Take the start of a step, with what acts during it."""
+        self._step, surroundings = step, self.surroundings
+        self._take(step.start)
+        surroundings.cover(step.begin, step.start.override, step.start.pose_goal)
+        acts = surroundings.actuation, self._inputs, self._work
+        when = step.begin, step.length, self._same
+        begin_step(self.problem, self._arrays, step.method, *acts, *when, self.places[0])
+
+    @property
+    def inputs(self):
+        """Inputs at the points of the step."""
+        return self._inputs
+
+    @property
+    def transduction(self) -> Array:
+        """Stimuli that modes have reached at the stage, shape (n_mode,)."""
+        return self._work.transduction
+
+    @property
+    def laws(self) -> Array:
+        """Eigenstrain of laws at the stage, shape (n_law,)."""
+        return self._work.strain
+
+    @property
+    def end_rates(self) -> Array:
+        """Rates of strains at the end of the stage, shape (n_strain,)."""
+        return self._work.end.strain_rate
+
+    @property
+    def origin_rates(self) -> Array:
+        """Rates of strains at its origin, likewise."""
+        return self._work.origin.strain_rate
+
+    def start(self, n: int) -> None:
+        """Start stage n, up to the first guess."""
+        step, places = self._step, (self.places[n], self.guesses[n])
+        while True:
+            stage = self.problem, self._arrays, step.method, self._inputs, self._work
+            status = begin_stage(*stage, n, step.length, *places)
+            if status == READY:
+                return
+            self._grow(status)
+
+    def go(self, n: int, reached: Reached) -> None:
+        """Go from the first guess of stage n to where it ended."""
+        travel = np.zeros(self.size)
+        travel[self.of_nodes] = reached.position - self.guesses[n].position
+        travel[self.of_edges] = reached.turn
+        self._travel(self.guesses[n], travel, n)
+
+    def _travel(self, base: Configuration, travel: Array, n: int) -> None:
+        self.move(base, travel, self._no_bodies, self.places[n + 1])
+        self.update_lagged(self.places[n + 1])
+
+    @property
+    def _no_bodies(self) -> Array:
+        return np.zeros_like(self.problem.system.body_step)
+
+    def finish(self, n: int) -> None:
+        """Take the end of stage n."""
+        at, work = self.places[n + 1], self._work
+        end_stage(self.problem, self._arrays, work, self._inputs, n, at)
+        work.start_angle[:] = work.end.angle
+        at.total_angle[:] = 0.0
+
+    def gradient(self, n: int) -> Array:
+        """Return the gradient of the potential where stage n ended, shape (size,)."""
+        self.evaluate(self.places[n + 1])
+        return self.sums.gradient.copy()
+
+    def find(self, n: int) -> tuple[Reached, float]:
+        """Go to where stage n ended, and factorise the Hessian there; return where, and the last correction [m]."""
+        at, spare, moved = self.places[n + 1], self._spare, math.inf
+        self.go(n, self._expected(n))
+        for _ in range(MOST):
+            self.evaluate(at, second=True)
+            shift, simplified = self.factorise(at)
+            if shift or simplified:
+                raise SimulationError("gradient: a step ends where the shape is unstable", self._step.begin)
+            travel = self.newton_step(self.sums.gradient, self._no_bodies)[0]
+            moved = np.abs(travel[self.of_nodes]).max()
+            moved = max(moved, self._size * np.abs(travel[self.of_edges]).max(initial=0.0))
+            if not moved > ENOUGH * self._size:
+                break
+            self.move(at, travel, self._no_bodies, spare)
+            at, spare = spare, at
+            self.update_lagged(at)
+        self.places[n + 1], self._spare = at, spare
+        turn = at.total_angle - self.guesses[n].total_angle
+        return Reached(at.position.copy(), turn), float(moved)
+
+    def _expected(self, n: int) -> Reached:
+        """Return where stage n ended, as far as both ends of the step tell."""
+        step, state, work, guess = self._step, self._step.start, self._work, self.guesses[n]
+        edges, h, end = len(self.of_edges), step.length, n + 1 == len(step.method.couplings)
+        base = guess if end else self.places[0]
+        there = tangents_of(self.problem.strands.edge_node, step.end.position)
+        turn = turn_between(base.tangent[:edges], base.director1[:edges], there, step.end.director1)
+        if end:
+            return Reached(step.end.position, turn)
+        moved = step.end.position - state.position - self.stage.length * step.end.velocity
+        turned = turn - self.stage.length * step.end.spin
+        if step.method.history:
+            along, bend = step.method.along[n + 1] * h, step.method.bend * h * h
+            moved = moved - along * state.velocity - bend * state.acceleration
+            turned = turned - along * state.spin - bend * state.spin_acceleration
+        coupling = step.method.couplings[n + 1, n]
+        turned = work.origin.angle + turned / coupling - work.start_angle - guess.total_angle
+        return Reached(state.position + work.origin.displacement + moved / coupling, turned)
+
+
+def tangents_of(edge_node: Array, position: Array) -> Array:
+    """Return the unit tangents of edges, shape (n_edge, 3)."""
+    vector = position[edge_node + 1] - position[edge_node]
+    return vector / np.linalg.norm(vector, axis=1, keepdims=True)

@@ -1,0 +1,567 @@
+"""Derivatives of a step that was made: forward along motions of its start, and backward from its end.
+
+With Y the positions of nodes, the turns of edges since the start of the step and the strains that have rates, V their
+rates, and an origin (Ȳ, V̄), a stage of length L (momenta: L′) ends where
+
+    g = P ᵀ[𝓜 (Y − Ȳ − L V̄)/(L L′) + 𝓓 (Y − Ȳ)/L] + elasticity, weight, contact = 0,    V = (Y − Ȳ)/L,    P = ∂Y/∂q
+
+with the masses 𝓜, those of raised edges among strains, and the damping 𝓓, viscosity among it. H = ∂g/∂q is that of
+Newton's method, and G what it lacks by the gyroscopic force. So along a motion of the origin
+
+    (H + G) dq = −dg,    dY = P dq,    dV = (dY − dȲ)/L
+
+and backward with the transpose of each line. ∂g/∂η of eigenstrains and ∂σ/∂q of viscous strains are read off the
+gradient itself, which is linear in η and in the strains of the origin: one evaluation for as many of them as no
+unknown sees together.
+
+A frame turns by dω about its tangent beyond what parallel transport does. The turn a of an edge since the start of the
+step is counted along the way start → first guess → end, whose transport depends on where tangents are:
+
+    da = da₀ + dω − dω₀ + Σ ½ κb·(dt₁ + dt₂),    κb = 2 t₁ × t₂/(1 + t₁·t₂) of each part of the way
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import sparse
+
+from bilayer_core.model.model import Model
+from bilayer_core.model.records.step import Configuration
+from bilayer_core.scene.transduction import lagged
+from bilayer_core.simulation.gradients.step_again import KeptStep, Reached, StepAgain
+
+Array = np.ndarray
+ROUNDS, ROUNDED = 60, 1e-15
+"""Of what a Hessian lacks: the most there may be, and the largest change of the last one, of the whole."""
+STRAIN = 1e-3
+"""Change of eigenstrains and of strains by which derivatives are read off."""
+
+
+@dataclass
+class Rates:
+    """Derivatives of a state, or by a state, in columns.
+
+    Attributes
+    ----------
+    place : ndarray
+        Of unknowns, turns of edges beyond transport among them, shape (size, n).
+    speed : ndarray
+        Of velocities of nodes and spins, likewise.
+    strain_rate : ndarray
+        Shape (n_strain, n).
+    reached : ndarray
+        What modes have reached of stimuli, shape (n_mode, n).
+    push, strain_push : ndarray
+        Rates of velocities and of rates of strains that a history keeps, likewise.
+    """
+
+    place: Array
+    speed: Array
+    strain_rate: Array
+    reached: Array
+    push: Array
+    strain_push: Array
+
+    @classmethod
+    def zeros(cls, again: StepAgain, columns: int) -> Rates:
+        """Return rates of a model without any."""
+        strains, modes = again.stage.origin_strain.size, again.transduction.size
+        sizes = again.size, again.size, strains, modes, again.size, strains
+        return cls(*(np.zeros((size, columns)) for size in sizes))
+
+
+@dataclass
+class Inputs:
+    """Derivatives of what acts in a step, or by it, in columns.
+
+    Attributes
+    ----------
+    first : ndarray
+        Of stimuli at the start, shape (n_channel, n).
+    stimulus : ndarray
+        At the stages, shape (n_stage, n_channel, n).
+    gain : ndarray
+        Of gains of laws, shape (n_law, n).
+    """
+
+    first: Array
+    stimulus: Array
+    gain: Array
+
+    @classmethod
+    def zeros(cls, again: StepAgain, stages: int, columns: int) -> Inputs:
+        """Return inputs that do not change."""
+        channels, laws = again.inputs.first.size, again.laws.size
+        return cls(np.zeros((channels, columns)), np.zeros((stages, channels, columns)), np.zeros((laws, columns)))
+
+
+def _triple(of: Array) -> Array:
+    """Return the matrices [v]× of vectors, shape (n, 3, 3)."""
+    out = np.zeros((len(of), 3, 3))
+    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -of[:, 2], of[:, 1], -of[:, 0]
+    return out - out.swapaxes(1, 2)
+
+
+class Constants:
+    """Matrices that rates of all steps of a model share, and which strains are apart from each other."""
+
+    def __init__(self, model: Model, again: StepAgain):
+        problem, strands = again.problem, again.problem.strands
+        self.size, self.strains = again.size, again.stage.origin_strain.size
+        edges = strands.edge_count
+        self.in_space = problem.space.exists
+        self.nodes = again.of_nodes
+        ends = strands.edge_node[:, None] + np.array([0, 1])
+        unknowns = self.nodes[ends]  # (edge, end, 3)
+        rows = np.arange(3 * edges).reshape(edges, 1, 3).repeat(2, axis=1)
+        signs = np.broadcast_to(np.array([-1.0, 1.0])[None, :, None], rows.shape)
+        shape = (3 * edges, self.size)
+        self.vectors = sparse.csr_matrix((signs.ravel(), (rows.ravel(), unknowns.ravel())), shape=shape)
+        self.turns = sparse.csr_matrix(
+            (np.ones(edges), (np.arange(edges), strands.edge_unknown)), shape=(edges, self.size)
+        )
+        self.spin_inertia = strands.spin_inertia if self.in_space else 0.0 * strands.spin_inertia
+        self.damping = problem.damping
+        self.masses = self._masses(again)
+        self.viscous = self._viscous(again)
+        drag = sparse.diags(np.concatenate([np.zeros(self.size), self.viscous]))
+        self.dissipation = (self.damping * self.masses + drag).tocsr()
+        free = np.ones(self.size)
+        free[(problem.constrained.unknown[:, None] + np.arange(3)).ravel()] = 0.0
+        self.free = sparse.diags(free)
+        self.groups = self._groups(again)
+        drives = problem.drives
+        rows = np.repeat(np.arange(len(drives.law_gain)), np.diff(drives.law_first))
+        within = np.arange(len(rows)) - drives.law_first[rows]
+        columns = drives.field_first[drives.law_field[rows]] + within
+        shape = (len(drives.law_gain), again.transduction.size)
+        self.followed = sparse.csr_matrix((drives.law_weight[: len(rows)], (rows, columns)), shape=shape).toarray()
+        counts = np.diff(drives.field_first)
+        self.channel = np.repeat(drives.field_channel, counts)
+        self.raised_rows = problem.raised.first + 3 * problem.raised.slot[:, None] + np.arange(3)
+
+    def _masses(self, again: StepAgain) -> sparse.csr_matrix:
+        strands, raised = again.problem.strands, again.problem.raised
+        whole = sparse.lil_matrix((self.size + self.strains,) * 2)
+        diagonal = np.zeros(self.size + self.strains)
+        diagonal[self.nodes] = strands.node_mass[:, None]
+        diagonal[strands.edge_unknown] = self.spin_inertia
+        whole.setdiag(diagonal)
+        for r, k in enumerate(raised.edge):
+            i = strands.edge_node[k]
+            for c in range(3):
+                own = self.size + raised.first + 3 * raised.slot[r] + c
+                for end in range(2):
+                    node = self.nodes[i + end, c]
+                    whole[node, own] = whole[own, node] = raised.first_moment[r, end]
+                whole[own, own] = raised.second_moment[r]
+        return whole.tocsr()
+
+    def _viscous(self, again: StepAgain) -> Array:
+        """Return the stiffness of each strain times its retardation time."""
+        problem, found = again.problem, np.zeros(self.strains)
+        strands, viscosity, bonds = problem.strands, problem.viscosity, problem.bonds
+        if viscosity.exists:
+            parts = [
+                strands.axial_stiffness * strands.rest_length * viscosity.edge_time,
+                (strands.joint_stiffness * viscosity.joint_time).ravel(),
+                bonds.stiffness.ravel() * viscosity.pair_time.ravel() if len(bonds.joint) else np.zeros(0),
+            ]
+            elements = np.concatenate(parts)
+            found[: len(elements)] = elements
+        return found
+
+    def _groups(self, again: StepAgain) -> list[list[tuple[int, Array]]]:
+        """Return groups of viscous strains that share no unknown, each with the unknowns that it depends on."""
+        strands, bonds = again.problem.strands, again.problem.bonds
+        edges, joints = strands.edge_count, len(strands.joint_a)
+
+        def of(*which: int) -> Array:
+            inner = [e for e in which if e < edges]
+            nodes = {n for e in inner for n in (strands.edge_node[e], strands.edge_node[e] + 1)}
+            return np.concatenate([self.nodes[sorted(nodes)].ravel(), strands.edge_unknown[inner]]).astype(int)
+
+        seen = [of(e) for e in range(edges)]
+        seen += [of(a, b) for a, b in zip(strands.joint_a, strands.joint_b, strict=True) for _ in range(3)]
+        for k in range(len(bonds.joint)):
+            own = of(strands.joint_a[bonds.joint[k]], strands.joint_b[bonds.joint[k]])
+            seen += [np.union1d(own, self.nodes[bonds.node[k]].ravel())] * 3
+        groups: list[list[tuple[int, Array]]] = []
+        taken: list[set[int]] = []
+        for k in np.flatnonzero(self.viscous > 0.0):
+            own = set(seen[k].tolist())
+            place = next((g for g, others in enumerate(taken) if others.isdisjoint(own)), len(groups))
+            if place == len(groups):
+                groups.append([])
+                taken.append(set())
+            groups[place].append((int(k), seen[k]))
+            taken[place] |= own
+        assert joints == len(strands.joint_b)
+        return groups
+
+    def tangents(self, at: Configuration) -> sparse.csr_matrix:
+        """Return ∂t/∂x of edges, shape (3 n_edge, size)."""
+        edges = len(self.spin_inertia)
+        t = at.tangent[:edges]
+        blocks = (np.eye(3) - t[:, :, None] * t[:, None, :]) / at.length[:edges, None, None]
+        return _block_diagonal(blocks) @ self.vectors
+
+    def strain_rates(self, again: StepAgain, at: Configuration, per_viscous: Array) -> sparse.csr_matrix:
+        """Return ∂σ/∂q, of viscous elements as given, and of directors of raised edges."""
+        found, raised = per_viscous, again.problem.raised
+        if not len(raised.edge):
+            return found
+        k = raised.edge
+        t, m1, m2 = at.tangent[k], at.director1[k], at.director2[k]
+        along = -t[:, :, None] * m1[:, None, :] / at.length[k, None, None]
+        unknowns = self.nodes[again.problem.strands.edge_node[k][:, None] + np.array([0, 1])]
+        rows = np.broadcast_to(self.raised_rows[:, None, :, None], (len(k), 2, 3, 3))
+        columns = np.broadcast_to(unknowns[:, :, None, :], (len(k), 2, 3, 3))
+        values = along[:, None] * np.array([-1.0, 1.0])[None, :, None, None]
+        parts = [(values.ravel(), rows.ravel(), columns.ravel())]
+        if self.in_space:
+            turned = np.broadcast_to(again.of_edges[k][:, None], (len(k), 3))
+            parts.append((m2.ravel(), self.raised_rows.ravel(), turned.ravel()))
+        data, row, column = (np.concatenate(of) for of in zip(*parts, strict=True))
+        return found + sparse.csr_matrix((data, (row, column)), shape=(self.strains, self.size))
+
+
+def _block_diagonal(blocks: Array) -> sparse.csr_matrix:
+    """Return a matrix of 3 × 3 blocks, shape (n, 3, 3)."""
+    n = len(blocks)
+    return sparse.bsr_matrix((blocks, np.arange(n), np.arange(n + 1)), shape=(3 * n, 3 * n)).tocsr()
+
+
+def _holonomy(constants: Constants, first: Configuration, second: Configuration) -> tuple:
+    """Return ∂a/∂x of both ends of a transport, beyond what frames turn, shapes (n_edge, size)."""
+    edges = len(constants.spin_inertia)
+    a, b = first.tangent[:edges], second.tangent[:edges]
+    half = np.cross(a, b) / (1.0 + np.einsum("ki,ki->k", a, b))[:, None]
+    rows = sparse.csr_matrix((half.ravel(), np.arange(3 * edges), np.arange(0, 3 * edges + 1, 3)))
+    return rows @ constants.tangents(first), rows @ constants.tangents(second)
+
+
+@dataclass
+class StageRates:
+    """Linear maps of a stage; see the module."""
+
+    length: float
+    momentum_length: float
+    strains: sparse.csr_matrix
+    by_laws: Array  # ∂g/∂η
+    lacking: sparse.csr_matrix | None = None  # G
+    by_turn: sparse.csr_matrix | None = None  # ∂g/∂a apart from the Hessian, shape (size, n_edge)
+    by_origin: sparse.csr_matrix | None = None  # ∂g/∂Ȳ by the gyroscopic force, shape (size, size)
+    way: tuple = ()  # of turns, by places at the start, at the first guess and at the end
+    law_by_mode: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    law_by_gain: Array = field(default_factory=lambda: np.zeros(0))
+    lag: Array = field(default_factory=lambda: np.zeros((3, 0)))  # ∂T/∂(T at the start, first, stimulus)
+
+
+class StepRates:
+    """Derivatives of kept steps, one after the other.
+
+    Parameters
+    ----------
+    model : Model
+    agains : sequence of StepAgain
+        As many as a step has stages at most: each holds the factor of one of them.
+    """
+
+    def __init__(self, model: Model, agains: Sequence[StepAgain]):
+        self._agains = agains
+        self.constants = Constants(model, agains[0])
+        self.residual = 0.0
+        self._moduli = agains[0].problem.moduli.exists or agains[0].problem.flattening.exists
+
+    def take(self, step: KeptStep) -> list[Reached]:
+        """Go to a step; return where its stages ended."""
+        self.step, self._stages, reached = step, [], []
+        stages = len(step.method.couplings)
+        for n, again in enumerate(self._agains[:stages]):
+            again.begin(step)
+            for earlier in range(n):
+                again.start(earlier)
+                again.go(earlier, reached[earlier])
+                again.finish(earlier)
+            again.start(n)
+            if n == 0:
+                again.evaluate(again.places[0])
+                self._start_strains = self._strains(again, again.places[0])
+            place, correction = again.find(n)
+            reached.append(place)
+            self.residual = max(self.residual, correction / step.length)
+            self._stages.append(self._rates(again, n))
+        return reached
+
+    def _strains(self, again: StepAgain, at: Configuration) -> sparse.csr_matrix:
+        """Return ∂σ/∂q at a configuration, with the gradient there evaluated."""
+        constants, stage = self.constants, again.stage
+        data, rows, columns = [np.zeros(0)], [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)]
+        if constants.groups:
+            before, origin = again.sums.gradient.copy(), stage.origin_strain.copy()
+            for group in constants.groups:
+                for k, _ in group:
+                    stage.origin_strain[k] -= STRAIN
+                again.evaluate(at)
+                change = again.sums.gradient - before
+                stage.origin_strain[:] = origin
+                for k, seen in group:
+                    data.append(change[seen] * (stage.length / (STRAIN * constants.viscous[k])))
+                    rows.append(np.full(len(seen), k))
+                    columns.append(seen)
+            again.evaluate(at)
+        where = np.concatenate(rows), np.concatenate(columns)
+        shape = (constants.strains, constants.size)
+        viscous = sparse.csr_matrix((np.concatenate(data), where), shape=shape)
+        return constants.strain_rates(again, at, viscous)
+
+    def _rates(self, again: StepAgain, n: int) -> StageRates:
+        constants, stage, at = self.constants, again.stage, again.places[n + 1]
+        again.evaluate(at)
+        found = StageRates(stage.length, stage.momentum_length, self._strains(again, at), self._by_laws(again, at))
+        if constants.in_space:
+            self._turning(again, n, found)
+        drives, laws = again.problem.drives, again.laws
+        if len(laws):
+            slope = 1.0 - (laws / drives.law_saturation) ** 2
+            found.law_by_mode = (slope * drives.law_gain)[:, None] * constants.followed
+            found.law_by_gain = slope * (constants.followed @ again.transduction - drives.law_reference)
+        found.lag = self._lag(again, n)
+        return found
+
+    def _by_laws(self, again: StepAgain, at: Configuration) -> Array:
+        """Return ∂g/∂η, shape (size, n_law)."""
+        laws, stage, drives = again.laws, again.stage, again.problem.drives
+        columns = np.zeros((self.constants.size, len(laws)))
+        edge, joint = stage.rest_edge.copy(), stage.rest_joint.copy()
+        for i in range(len(laws)):
+            sides = []
+            for sign in (1.0, -1.0):
+                own = drives.driven_law == i
+                np.add.at(stage.rest_edge, drives.driven_edge[own], sign * STRAIN * drives.driven_weight[own])
+                own = drives.driven_joint_law == i
+                where = drives.driven_joint[own], drives.driven_joint_column[own]
+                np.add.at(stage.rest_joint, where, sign * STRAIN * drives.driven_joint_weight[own])
+                again.evaluate(at)
+                sides.append(again.sums.gradient.copy())
+                stage.rest_edge[:], stage.rest_joint[:] = edge, joint
+            columns[:, i] = (sides[0] - sides[1]) / (2.0 * STRAIN)
+        return columns
+
+    def _turning(self, again: StepAgain, n: int, found: StageRates) -> None:
+        """Add what the turns of edges, and their gyroscopic force, ask for."""
+        constants, stage, at, strands = self.constants, again.stage, again.places[n + 1], again.problem.strands
+        edges = len(constants.spin_inertia)
+        by_start, by_guess = _holonomy(constants, again.places[n], again.guesses[n])
+        more, by_end = _holonomy(constants, again.guesses[n], at)
+        found.way = by_start, by_guess + more, by_end
+        t, length, inertia = at.tangent[:edges], at.length[:edges, None], constants.spin_inertia[:, None]
+        x, origin, i = at.position, stage.origin_position, strands.edge_node
+        lengthened = (x[i + 1] - x[i]) - (origin[i + 1] - origin[i])
+        turned = (at.total_angle - stage.origin_angle)[:, None]
+        factor = inertia / (stage.length * length) ** 2
+        around = np.cross(t, lengthened)
+        force = factor * turned * around
+        along = (np.eye(3) - t[:, :, None] * t[:, None, :]) / length[:, :, None]
+        scaled = (factor * turned)[:, :, None]
+        by_vector = scaled * (_triple(t) - _triple(lengthened) @ along)
+        by_vector -= 2.0 * force[:, :, None] * (t / length)[:, None, :]
+        pull = -constants.vectors.T
+        columns = np.repeat(np.arange(edges), 3)
+        of_turn = sparse.csr_matrix(((factor * around).ravel(), (np.arange(3 * edges), columns)))
+        by_turn = pull @ of_turn
+        spin = constants.spin_inertia * (1.0 / stage.momentum_length + constants.damping) / stage.length
+        both = by_turn + constants.turns.T @ sparse.diags(spin)
+        ahead = (
+            spin * at.total_angle
+            - constants.spin_inertia / (stage.length * stage.momentum_length) * stage.predicted_angle
+        )
+        ahead -= constants.spin_inertia * constants.damping / stage.length * stage.origin_angle
+        by_vector += 0.5 * _triple(t) * (ahead / at.length[:edges] ** 2)[:, None, None]
+        found.lacking = (
+            both @ by_end + by_turn @ constants.turns + pull @ _block_diagonal(by_vector) @ constants.vectors
+        ).tocsr()
+        found.by_turn = both.tocsr()
+        found.by_origin = (
+            -by_turn @ constants.turns - pull @ _block_diagonal(scaled * _triple(t)) @ constants.vectors
+        ).tocsr()
+
+    def _lag(self, again: StepAgain, n: int) -> Array:
+        """Return what each mode takes of what it had reached, of the first stimulus and of that of the stage."""
+        drives, inputs, state = again.problem.drives, again.inputs, self.step.start
+        found = np.zeros((3, len(self.constants.channel)))
+        for m, channel in enumerate(self.constants.channel):
+            own = state.transduction[m], inputs.first[channel], inputs.stimulus[n, channel]
+            lags = float(drives.mode_rising[m]), float(drives.mode_falling[m])
+            lag = lags[0] if own[2] > own[0] else lags[1]  # on either side of it
+            for k in range(3):
+                unit = [float(j == k) for j in range(3)]
+                found[k, m] = lagged(*unit, lag, lag, float(inputs.elapsed[n]))
+        return found
+
+    @property
+    def _forgotten(self) -> slice:
+        """Rows of rates of rates of strains that a step leaves without which the method has no history."""
+        size, raised = self.constants.size, self._agains[0].problem.raised
+        if self.step.method.history:
+            return slice(0, 0)
+        return slice(size, size + raised.first if raised.exists else None)
+
+    # forward
+
+    def forward(self, start: Rates, acts: Inputs, direct: Sequence[Array] | None = None) -> Rates:
+        """Return how the end of the step changes.
+
+        Parameters
+        ----------
+        start : Rates
+            Of its start.
+        acts : Inputs
+        direct : sequence of ndarray, optional
+            Of the gradient at the ends of stages by parameters alone, each of shape (size, n).
+        """
+        constants, method, h = self.constants, self.step.method, self.step.length
+        size, edges = constants.size, self._agains[0].of_edges
+        first = np.concatenate([constants.free @ start.place, self._start_strains @ start.place])
+        first[edges] = 0.0
+        speed = np.concatenate([constants.free @ start.speed, start.strain_rate])
+        push = np.concatenate([start.push, start.strain_push])
+        place, turn = start.place, np.zeros((len(edges), start.place.shape[1]))
+        gained: list[tuple[Array, Array]] = []
+        for n, stage in enumerate(self._stages):
+            origin, origin_speed = first.copy(), speed.copy()
+            for coupling, (of_place, of_speed) in zip(method.couplings[n], gained, strict=False):
+                origin += coupling * of_place
+                origin_speed += coupling * of_speed
+            if method.history:
+                origin += method.along[n] * h * speed + method.bend * h * h * push
+                origin_speed += method.momenta[n] * h * push
+            reached = stage.lag[0][:, None] * start.reached
+            if len(constants.channel):
+                reached += stage.lag[1][:, None] * acts.first[constants.channel]
+                reached += stage.lag[2][:, None] * acts.stimulus[n, constants.channel]
+            change = -constants.masses @ (origin + stage.length * origin_speed)
+            change = change / (stage.length * stage.momentum_length) - constants.dissipation @ origin / stage.length
+            right = change[:size] + stage.strains.T @ change[size:]
+            if len(stage.law_by_gain):
+                laws = stage.law_by_mode @ reached + stage.law_by_gain[:, None] * acts.gain
+                right += stage.by_laws @ laws
+            if direct is not None:
+                right += direct[n]
+            before = np.zeros_like(turn)
+            if stage.way:
+                guess = constants.free @ (origin[:size] + stage.length * origin_speed[:size])
+                before = turn - place[edges] + stage.way[0] @ place + stage.way[1] @ guess
+                right += stage.by_turn @ before + stage.by_origin @ origin[:size]
+            moved = -self._solved(n, right, stage.lacking)
+            end = np.concatenate([moved, stage.strains @ moved])
+            if stage.way:
+                end[edges] = before + moved[edges] + stage.way[2] @ moved
+            end_speed = (end - origin) / stage.length
+            gained.append((end - origin, end_speed - origin_speed))
+            place, turn = moved, end[edges]
+        kept = (end_speed - origin_speed) / stage.momentum_length
+        kept = (kept - method.carry * push) / (1.0 - method.carry)
+        kept[self._forgotten] = 0.0
+        return Rates(place, end_speed[:size], end_speed[size:], reached, kept[:size], kept[size:])
+
+    def _solved(self, n: int, right: Array, lacking: sparse.csr_matrix | None) -> Array:
+        """Return the inverse of the matrix of stage n times columns."""
+        again, no_bodies = self._agains[n], self._agains[n]._no_bodies
+
+        def by_hessian(columns: Array) -> Array:
+            return np.stack([-again.newton_step(column, no_bodies)[0] for column in columns.T], axis=1)
+
+        free = self.constants.free
+        found = by_hessian(free @ right)
+        for _ in range(ROUNDS if lacking is not None else 0):
+            new = by_hessian(free @ (right - lacking @ found))
+            change = np.abs(new - found).max(axis=0) > ROUNDED * np.abs(new).max(axis=0)
+            found = new
+            if not change.any():
+                break
+        return found
+
+    # backward
+
+    def backward(self, end: Rates) -> tuple[Rates, Inputs, list[Array]]:
+        """Return the derivatives by the start of the step, by what acts, and by the gradients where stages ended, from
+        those by the end of the step.
+        """
+        constants, method, h = self.constants, self.step.method, self.step.length
+        size, edges, columns = constants.size, self._agains[0].of_edges, end.place.shape[1]
+        start = Rates.zeros(self._agains[0], columns)
+        acts = Inputs.zeros(self._agains[0], len(self._stages), columns)
+        push = np.zeros((size + constants.strains, columns))
+        first, speed = np.zeros_like(push), np.zeros_like(push)
+        count = len(self._stages)
+        ends = [np.zeros_like(push) for _ in range(count)]
+        end_speeds = [np.zeros_like(push) for _ in range(count)]
+        origins = [np.zeros_like(push) for _ in range(count)]
+        origin_speeds = [np.zeros_like(push) for _ in range(count)]
+        places = [np.zeros((size, columns)) for _ in range(count)]
+        direct: list[Array] = [np.zeros((size, columns))] * count
+        places[-1] += end.place
+        kept = np.concatenate([end.push, end.strain_push]) / (1.0 - method.carry)
+        kept[self._forgotten] = 0.0
+        push -= method.carry * kept
+        end_speeds[-1] += np.concatenate([end.speed, end.strain_rate]) + kept / self._stages[-1].momentum_length
+        origin_speeds[-1] -= kept / self._stages[-1].momentum_length
+        for n in reversed(range(count)):
+            stage = self._stages[n]
+            ends[n] += end_speeds[n] / stage.length
+            origins[n] -= end_speeds[n] / stage.length
+            moved = places[n] + ends[n][:size] + stage.strains.T @ ends[n][size:]
+            before = np.zeros((len(edges), columns))
+            if stage.way:
+                moved += stage.way[2].T @ ends[n][edges]
+                before += ends[n][edges]
+            transposed = None if stage.lacking is None else stage.lacking.T.tocsr()
+            right = direct[n] = -self._solved(n, moved, transposed)
+            change = np.concatenate([right, stage.strains @ right])
+            of_mass = constants.masses @ change / (stage.length * stage.momentum_length)
+            origins[n] -= of_mass + constants.dissipation @ change / stage.length
+            origin_speeds[n] -= stage.length * of_mass
+            reached = end.reached if n + 1 == count else np.zeros_like(end.reached)
+            if len(stage.law_by_gain):
+                laws = stage.by_laws.T @ right
+                reached = reached + stage.law_by_mode.T @ laws
+                acts.gain += stage.law_by_gain[:, None] * laws
+            start.reached += stage.lag[0][:, None] * reached
+            if len(constants.channel):
+                np.add.at(acts.first, constants.channel, stage.lag[1][:, None] * reached)
+                np.add.at(acts.stimulus[n], constants.channel, stage.lag[2][:, None] * reached)
+            if stage.way:
+                before += stage.by_turn.T @ right
+                origins[n][:size] += stage.by_origin.T @ right
+                guess = constants.free @ (stage.way[1].T @ before)
+                origins[n][:size] += guess
+                origin_speeds[n][:size] += stage.length * guess
+                of_start = stage.way[0].T @ before
+                of_start[edges] -= before
+                if n:
+                    places[n - 1] += of_start
+                    ends[n - 1][edges] += before
+                else:
+                    start.place += of_start
+            if method.history:
+                speed += method.along[n] * h * origins[n]
+                push += method.bend * h * h * origins[n] + method.momenta[n] * h * origin_speeds[n]
+            first += origins[n]
+            speed += origin_speeds[n]
+            for j in range(n):
+                coupling = method.couplings[n, j]
+                ends[j] += coupling * origins[n]
+                origins[j] -= coupling * origins[n]
+                end_speeds[j] += coupling * origin_speeds[n]
+                origin_speeds[j] -= coupling * origin_speeds[n]
+        first[edges] = 0.0
+        start.place += constants.free @ first[:size] + self._start_strains.T @ first[size:]
+        start.speed += constants.free @ speed[:size]
+        start.strain_rate += speed[size:]
+        start.push, start.strain_push = push[:size], push[size:]
+        return start, acts, direct

@@ -1,0 +1,200 @@
+"""Derivatives of runs against differences of runs with the same steps."""
+
+import numpy as np
+import pytest
+
+from bilayer_core import Simulator, load_scene
+from bilayer_core.errors import InputError
+from bilayer_core.simulation.gradients.course import Course
+from bilayer_core.verification.validate.gradients import TIGHT, differences_of_runs
+
+HANGING = {"gravity": [0, 0, -9.81], "stimuli.swelling.schedule.to": 0.8}
+ACTIVE = "rods.strip.layers.active"
+GAIN, THICKNESS, LENGTH = f"{ACTIVE}.eigenstrain.gain", f"{ACTIVE}.thickness", "rods.strip.path.length"
+MODULUS, DENSITY, LAG = (
+    "materials.active.youngs_modulus",
+    "materials.active.density",
+    f"{ACTIVE}.eigenstrain.time_constant",
+)
+LEVEL, TIME, VISCOSITY = (
+    "stimuli.swelling.schedule.to",
+    "stimuli.swelling.schedule.end",
+    "materials.active.retardation_time",
+)
+POST = {"name": "post", "type": "sphere", "radius": 0.005, "position": [0.03, 0, -0.0068]}
+ON_A_POST = {
+    "gravity": [0, 0, -9.81],
+    LEVEL: 0.1,
+    "obstacles": [POST],
+    "contact": {"barrier_distance": 2e-4, "stiffness": "1 MPa"},
+}
+MOVES = {"bodies.wall.motion": {"type": "prescribed", "times": [0, 0.1], "displacements": [[0, 0, 0], [0, 0, 0.01]]}}
+EULER = {"solver.integrator": "implicit_euler", "solver.dt": 0.004, "solver.tolerance": None}
+ALPHA = {"solver.integrator": "generalised_alpha"}
+UNLIKE = {"solver.integrator": "tr_bdf2", THICKNESS: 1.5e-4}
+VISCOUS, SPACE = {VISCOSITY: 0.05}, {"solver.dimension": 3}
+CASES = {
+    "in a plane": ("bending", HANGING, 0.2, [GAIN, LEVEL, TIME, MODULUS, THICKNESS, "gravity.2", LENGTH]),
+    "in space": ("bending", HANGING | SPACE, 0.2, [GAIN, MODULUS, LENGTH]),
+    "two rods": ("bending", HANGING | {"solver.model": "two_rod"}, 0.1, [GAIN, MODULUS, LENGTH]),
+    "implicit euler with fixed steps": ("bending", HANGING | EULER, 0.1, [GAIN, MODULUS, LENGTH]),
+    "viscosity": ("bending", HANGING | VISCOUS, 0.2, [GAIN, DENSITY, LENGTH, VISCOSITY]),
+    "viscosity in space": ("bending", HANGING | VISCOUS | SPACE, 0.1, [GAIN, VISCOSITY]),
+    "generalised alpha": ("bending", HANGING | ALPHA | VISCOUS | SPACE, 0.1, [GAIN, MODULUS, THICKNESS]),
+    "layers that become unlike": ("bending", HANGING | UNLIKE, 0.1, [MODULUS, DENSITY]),
+    "a lag": ("bending", HANGING | {LAG: 0.05}, 0.2, [GAIN, LEVEL, LAG]),
+    "masses off the curve": ("bending", HANGING | {THICKNESS: 1.5e-4, DENSITY: 2000.0}, 0.1, [THICKNESS, LENGTH]),
+    "a clamp that moves": ("bending", HANGING | MOVES, 0.1, [GAIN, "bodies.wall.motion.displacements.1.2"]),
+    "a strip that curls": ("bending", HANGING | {"rods.strip.section": "strip", LEVEL: 0.3}, 0.2, [GAIN, MODULUS]),
+    "fibres in space": ("chiral_pod", {}, 0.02, ["gravity.2"]),
+}
+STEPS = {LENGTH: 1e-5}
+"""Differences of second order have their least errors with these, else with 1e-4."""
+
+
+def kept_run(name, overrides, duration):
+    simulator = Simulator(load_scene(name, TIGHT | overrides))
+    return simulator, simulator.run(duration, gradients=True)
+
+
+def error(found, other):
+    return np.abs(found - other).max() / np.abs(other).max()
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_gradients_of_runs_agree_with_differences_of_runs_to_1e_6(case):
+    name, overrides, duration, to = CASES[case]
+    simulator, result = kept_run(name, overrides, duration)
+    steps = result.differentiable.made
+    found = result.gradient("com", to)
+    for path in to:
+        (other,) = differences_of_runs(name, overrides, steps, path, STEPS.get(path, 1e-4), ["com"])
+        assert error(found["com", path], other) < 1e-6, path
+
+
+@pytest.mark.parametrize("to", [GAIN, LEVEL, MODULUS, "obstacles.post.radius"])
+def test_gradients_of_runs_through_contact_agree_to_1e_4(to):
+    simulator, result = kept_run("bending", ON_A_POST, 0.2)
+    assert np.abs(simulator.contact_forces).max() > 1e-3
+    of = ["com", "rod/strip/position"]
+    found = result.gradient(of, to)
+    for name, other in zip(
+        of, differences_of_runs("bending", ON_A_POST, result.differentiable.made, to, 1e-5, of), strict=True
+    ):
+        assert error(found[name, to], other) < 1e-4, name
+
+
+def test_differences_of_runs_over_a_ladder_of_steps_reach_a_plateau_at_the_gradient():
+    simulator, result = kept_run("bending", HANGING, 0.1)
+    found, steps = result.gradient("com", THICKNESS)["com", THICKNESS], result.differentiable.made
+    ladder = [
+        error(differences_of_runs("bending", HANGING, steps, THICKNESS, step, ["com"])[0], found)
+        for step in (1e-2, 1e-3, 1e-4, 1e-9)
+    ]
+    assert ladder[0] > 50.0 * ladder[1] > 1e-6  # second order: 100 times
+    assert ladder[2] < 1e-7
+    assert ladder[3] > 10.0 * ladder[2]  # rounding
+
+
+BACK = {
+    "in a plane": ("bending", HANGING, 0.1, [GAIN, LEVEL, THICKNESS, LENGTH]),
+    "in space": ("bending", HANGING | SPACE | VISCOUS, 0.1, [GAIN, LEVEL, MODULUS, VISCOSITY]),
+    "fibres in space": ("chiral_pod", {}, 0.02, ["gravity.2"]),
+    "generalised alpha": ("bending", HANGING | ALPHA | VISCOUS, 0.1, [GAIN, MODULUS]),
+    "contact": ("bending", ON_A_POST, 0.2, [LEVEL, "obstacles.post.radius"]),
+}
+
+
+@pytest.mark.parametrize("case", BACK)
+def test_what_comes_back_from_the_end_is_what_goes_forward_to_1e_10(case):
+    name, overrides, duration, to = BACK[case]
+    simulator, result = kept_run(name, overrides, duration)
+    seeds = {
+        of: np.random.default_rng(k).normal(size=(simulator.model.node_count, 3))
+        for k, of in enumerate(("positions", "velocities"))
+    }
+    back = result.pull_back(seeds, to)
+    response = result.differentiable.response()
+    numbers = [number for of in response.numbers(to).values() for number in of]
+    along = response.forward(numbers)
+    for k, path in enumerate(to):
+        forward = np.vdot(seeds["positions"], along.place[response.nodes, k]) + np.vdot(
+            seeds["velocities"], along.speed[response.nodes, k]
+        )
+        assert back[path] == pytest.approx(forward, rel=1e-10), path
+
+
+def test_keeping_steps_changes_no_bit_of_a_run():
+    runs = [Simulator(load_scene("bending", HANGING)) for _ in range(2)]
+    for simulator, gradients in zip(runs, (False, True), strict=True):
+        simulator.run(0.1, gradients=gradients)
+    assert runs[0].save_state().tobytes() == runs[1].save_state().tobytes()
+
+
+def test_steps_of_which_no_state_is_kept_are_made_again_bit_for_bit():
+    simulator = Simulator(load_scene("bending", HANGING | VISCOUS))
+    simulator.compile()
+    rooms = 2**28, 5 * simulator._state.values.nbytes
+    kept = [Course(simulator._stepper, simulator._state, room) for room in rooms]
+
+    def each_step(_):
+        for course in kept:
+            course.take()
+        if 0.02 < simulator.time < 0.04:
+            simulator.set_stimulus("swelling", 10.0 * simulator.time)
+
+    simulator.run(0.1, each_step=each_step)
+    assert len(kept[1]._spans) < 0.7 * len(kept[0]._spans) == 0.7 * len(kept[0])
+    maker = simulator._builders.stepper_of(simulator.model)
+    for backward in (False, True):
+        pairs = list(zip(*(course.steps(maker, backward) for course in kept), strict=True))
+        assert len(pairs) == len(kept[0])
+        for one, other in pairs:
+            assert one.end.position.tobytes() == other.end.position.tobytes()
+            assert one.start.velocity.tobytes() == other.start.velocity.tobytes()
+            assert one.method is other.method
+
+
+def test_a_run_that_begins_elsewhere_begins_there_whatever_the_numbers_are():
+    simulator = Simulator(load_scene("bending", HANGING))
+    simulator.run(0.05)
+    first = simulator.run(0.01, gradients=True)
+    whole = Simulator(load_scene("bending", HANGING)).run(0.06, gradients=True)
+    to = "gravity.2"
+    assert abs(first.gradient("com", to)["com", to][2]) < 0.5 * abs(whole.gradient("com", to)["com", to][2])
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides", "to", "told"),
+    [
+        ("crawling_inchworm", {}, "materials.film.density", "the force 'friction'"),
+        ("flagellum", {}, "fluid.viscosity", "the force 'drag', the force 'added mass'"),
+        ("arch", {}, "gravity.2", "free bodies"),
+        ("bending", {"solver.integrator": "implicit_midpoint"}, GAIN, "end beyond their last stage"),
+        ("bending", {"start": "settle"}, GAIN, "a start that settles"),
+        ("bending", {}, "swelling", "a number of its schedule"),
+        ("bending", {}, "contact.stiffness", "contact"),
+    ],
+)
+def test_what_runs_are_not_differentiated_through_or_by_is_refused_by_name(name, overrides, to, told):
+    result = Simulator(load_scene(name, overrides)).run(1e-3, gradients=True)
+    with pytest.raises(InputError if told != "contact" else Exception, match=told):
+        result.gradient("com", to)
+
+
+def test_numbers_that_act_on_nothing_in_a_run_are_refused():
+    result = Simulator(load_scene("bending", {"solver.integrator": "sdirk2"})).run(1e-2, gradients=True)
+    with pytest.raises(InputError, match="acts on nothing in this run"):
+        result.gradient("com", "output.rate")
+
+
+def test_a_run_without_kept_steps_has_no_gradient():
+    result = Simulator("bending").run(1e-2)
+    with pytest.raises(InputError, match="run\\(gradients=True\\)"):
+        result.gradient("com", GAIN)
+
+
+def test_seeds_that_do_not_fit_are_refused():
+    result = Simulator("bending").run(1e-2, gradients=True)
+    with pytest.raises(InputError, match="allowed are positions and velocities"):
+        result.pull_back({"positions": np.zeros(3)}, GAIN)
