@@ -46,7 +46,7 @@ class Observables:
     touching_count: Indices = (1,)
     touched: Flags = ("owner squared",)  # scratch
     owners: int  # n of the pairs
-    pair_of: IndexTable  # number of a pair of owners among those whose forces are seen, −1 of others, shape (n, n)
+    seen_pair: Indices  # numbers of the pairs whose forces are seen, ascending, shape (n_seen_pair,)
     mechanism_joint: Indices  # whose each mechanism is, −1 of guided bodies, shape (n_mechanism,)
     values: Vector
     strain: Vector = ("observed point",)  # of nodes, the mean of their edges', with eigenstrain; 0 at points of bodies
@@ -182,9 +182,16 @@ def _observe_touching(p, out):
 @kernel
 def _note(a, b, force, count, out):
     """Add a pair unless it is known, and the force of one of its contacts; how many pairs there are."""
-    if out.pair_of[a, b] >= 0:
-        out.pair_force[out.pair_of[a, b]] += force
     number = min(a, b) * out.owners + max(a, b)
+    first, last = 0, out.seen_pair.shape[0]
+    while first < last:
+        middle = (first + last) // 2
+        if out.seen_pair[middle] < number:
+            first = middle + 1
+        else:
+            last = middle
+    if first < out.seen_pair.shape[0] and out.seen_pair[first] == number:
+        out.pair_force[first] += force
     if out.touched[number]:
         return count
     out.touched[number], out.touching[count] = True, number
@@ -217,16 +224,15 @@ COMPUTED = tuple(name for name in Observables.shapes if name not in ("touching",
 
 
 def observables_of(
-    model: Model, owner_of_point: Array, owner_of_surface: Array, pair_of: Array
+    model: Model, owner_of_point: Array, owner_of_surface: Array, owners: int, seen_pair: Array
 ) -> tuple[Observables, dict[str, tuple[int, int, tuple[int, ...]]]]:
     """Return the record of a model, and the begin, end and shape of each part of its values by name.
 
-    The owners of contact points and surfaces are numbers of rows of `pair_of`, the table of pairs.
+    The owners of contact points and surfaces are numbers below `owners`.
     """
-    owners = len(pair_of)
     sizes = sizes_of(model) | {"observed point": model.node_count + model.point_count}
     sizes |= {"pair of owners": owners * (owners + 1) // 2, "owner squared": owners**2}
-    sizes |= {"seen pair": int(pair_of.max(initial=-1)) + 1, "body joint": len(model.scene.joints)}
+    sizes |= {"seen pair": len(seen_pair), "body joint": len(model.scene.joints)}
     sizes |= {"mechanism": len(model.mechanisms)}
     joint_of = {joint.name: k for k, joint in enumerate(model.scene.joints)}
     values, parts = zeros_in_one(shapes_of(Observables, sizes, COMPUTED))
@@ -243,7 +249,7 @@ def observables_of(
         owner_of_point=owner_of_point,
         owner_of_surface=owner_of_surface,
         owners=owners,
-        pair_of=pair_of,
+        seen_pair=seen_pair,
         mechanism_joint=np.array([-1 if m.is_guide else joint_of[m.owner] for m in model.mechanisms], dtype=np.int64),
         values=values,
         **parts,

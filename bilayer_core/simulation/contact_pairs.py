@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations, product
+from itertools import combinations, islice, product
 
 import numpy as np
 
@@ -27,10 +27,12 @@ class ContactOwners:
     ----------
     of_point, of_surface : Array
         Number of the owner of each contact point and surface, shape (n_contact_point,), (n_surface,).
+    count : int
+        How many owners there are.
     pairs : tuple of (str, str)
         Those that can touch, and whose forces are told.
-    pair_of : Array
-        Number of each pair in `pairs`, −1 for others, shape (owners, owners).
+    seen_pair : Array
+        Their numbers a · count + b, a ≤ b, ascending, shape (n_pair,).
     """
 
     def __init__(self, model: Model):
@@ -46,12 +48,11 @@ class ContactOwners:
         self.of_point = np.concatenate([of_node, model.sliding.owner[others] + copies, of_node[points.rod_points.node]])
         self.of_surface = model.sliding.surface_owner + copies
         numbers = {name: number for number, name in enumerate(self._names)}
-        of_rods = {(numbers[a], numbers[b]) for a, b in _pairs_of_rods(model)}
-        found = sorted(pair for of in (of_rods, set(self._with_surfaces(model))) if len(of) <= MOST_TOLD for pair in of)
-        self.pairs = tuple((self._names[a], self._names[b]) for a, b in found)
-        self.pair_of = np.full((len(self._names),) * 2, -1, dtype=np.int64)
-        for number, (a, b) in enumerate(found):
-            self.pair_of[a, b] = self.pair_of[b, a] = number
+        of_rods = ((numbers[a], numbers[b]) for a, b in _pairs_of_rods(model))
+        kinds = (set(islice(of, MOST_TOLD + 1)) for of in (of_rods, self._with_surfaces(model)))
+        found = sorted(pair for of in kinds if len(of) <= MOST_TOLD for pair in of)
+        self.pairs, self.count = tuple((self._names[a], self._names[b]) for a, b in found), len(self._names)
+        self.seen_pair = np.array([a * self.count + b for a, b in found], dtype=np.int64)
 
     def _with_surfaces(self, model: Model) -> Iterator[tuple[int, int]]:
         points = model.surfaces
@@ -63,7 +64,7 @@ class ContactOwners:
         """Return the names of the pairs of what `engine.observables` saw touch: a rod comes before a body, and a body
         before an obstacle.
         """
-        pairs = (divmod(code, len(self._names)) for code in sorted(touching.tolist()))
+        pairs = (divmod(code, self.count) for code in sorted(touching.tolist()))
         return tuple((self._names[a], self._names[b]) for a, b in pairs)
 
 

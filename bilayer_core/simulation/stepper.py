@@ -161,7 +161,7 @@ class Stepper:
     @cached_property
     def _observables(self) -> tuple[Observables, Places]:
         owners = self.contact_owners
-        return observables_of(self.model, owners.of_point, owners.of_surface, owners.pair_of)
+        return observables_of(self.model, owners.of_point, owners.of_surface, owners.count, owners.seen_pair)
 
     def observe(self, state: State) -> tuple[Parts, np.ndarray]:
         """Return the observables of a state that was reached or evaluated last, by their names in `engine.observables`,

@@ -119,7 +119,7 @@ def test_each_pair_that_touches_is_seen_once(simulator):
         expected |= {tuple(sorted(pair)) for pair in nodes.tolist()}
     for _ in range(2):
         _, seen = simulator._stepper.observe(simulator._state)
-        assert sorted(divmod(number, len(owners.pair_of)) for number in seen.tolist()) == sorted(expected)
+        assert sorted(divmod(number, owners.count) for number in seen.tolist()) == sorted(expected)
     assert len(simulator.frame().contacts) == len(expected)
 
 

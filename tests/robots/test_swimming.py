@@ -18,8 +18,7 @@ STROKES = {"fluid.added_mass=false": 3.978e-3, "fluid.added_mass=true": 4.543e-3
 
 def height(simulator):
     """Of the mass centre of arms and hub [m]."""
-    arms, hub = simulator.model.rods.node_mass.sum(), simulator.model.free_bodies.mass[0]
-    return (arms * simulator.com[2] + hub * simulator.bodies["hub"].position[2]) / (arms + hub)
+    return simulator.com[2]
 
 
 def strokes(count, *changes, **options):
