@@ -6,6 +6,8 @@ PYTHON ?= python3
 JOBS ?= 3
 VENV := .venv
 BIN := $(VENV)/bin
+# Python compiles modules when they are first imported: a fifth of what pip installs and would compile.
+PIP := $(BIN)/python -m pip install --no-compile
 
 # A ROS 2 environment that is already sourced is used as it is; otherwise ROS 2 comes as pinned wheels.
 SOURCED_ROS := $(shell test -n "$$AMENT_PREFIX_PATH" && $(PYTHON) -c 'import rclpy' 2>/dev/null && echo yes)
@@ -78,14 +80,14 @@ clean:  ## Remove .venv and what runs and tests left.
 $(STAMP): setup.py pyproject.toml package.xml | system
 	@test -z "$$(ls $(VENV)/installed-with-ros-* 2>/dev/null | grep -vx '$(STAMP)')" || rm -rf $(VENV)
 	$(PYTHON) -m venv $(VENV_OPTIONS) $(VENV)
-	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python -m pip install --editable .
+	$(PIP) --quiet --upgrade pip
+	$(PIP) --editable .
 	$(BIN)/bilayer run gripping --duration '1 ms' --log $(VENV)/first.mcap --force --quiet & \
-	    $(BIN)/python -m pip install --editable '.[$(EXTRAS)]' && wait
+	    $(PIP) --editable '.[$(EXTRAS)]' && wait
 	@touch $@
 
 $(TESTS): $(STAMP)
-	$(BIN)/python -m pip install --editable '.[test]'
+	$(PIP) --editable '.[test]'
 	@touch $@
 
 kernels: $(STAMP)  ## Compile the kernels, once for each state of the sources.

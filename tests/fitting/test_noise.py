@@ -145,6 +145,7 @@ def slap():
     return parameters, columns, Runs(scene, parameters, read_data(columns, known, nodes, 1.0))
 
 
+@pytest.mark.verify
 def test_a_step_from_measured_noise_has_the_slope_of_impacts_and_a_naive_one_not(slap):
     """At most of several moduli: seven values tell a noise to a factor of two or so, and the best step with it."""
     (parameter,), _, runs = slap

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,8 +16,10 @@ from bilayer_core.simulation.gradients.course import Course
 from bilayer_core.simulation.gradients.equilibrium_response import NOTHING, Equilibrium
 from bilayer_core.simulation.gradients.nearby import PLACES, Builders, slope
 from bilayer_core.simulation.gradients.parameters import Parameter
-from bilayer_core.simulation.gradients.run_response import RunResponse
 from bilayer_core.simulation.stepper import Stepper
+
+if TYPE_CHECKING:
+    from bilayer_core.simulation.gradients.run_response import RunResponse
 
 Array = np.ndarray
 Column = list[tuple[Array, Array]]
@@ -130,6 +133,8 @@ class DifferentiableRun:
         """Return what goes along the steps and back."""
         if not np.array_equal(self._gains, self._model.drives.law_gain):
             raise InputError("gradient: the gains are others than in the run; differentiate before set_gains")
+        from bilayer_core.simulation.gradients.run_response import RunResponse  # brings scipy's sparse solvers
+
         return RunResponse(self._course, self._builders.stepper_of(self._model), self._builders, self._description)
 
     def gradient(self, of: str | Sequence[str], to: str | Sequence[str]) -> Gradient:
