@@ -9,8 +9,9 @@ import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from support.bags import write_bag
 
-from bilayer_core import read_log
+from bilayer_core import Simulator, load_scene, read_log
 from bilayer_core.cli import main
+from bilayer_core.log.messages.topics import output_topics
 from bilayer_core.log.run.log_reader import read_info
 from bilayer_sim_ros.node.message_types import message_class
 
@@ -40,7 +41,10 @@ class Recorder:
                 take = functools.partial(self._take, topic, ros_type)
                 node.create_subscription(message_class(ros_type), topic, take, quality, raw=True)
         client.spin_until(lambda: len(self.count("/description")) == len(nodes), "the descriptions")
-        client.spin_until(lambda: all(self.count(f"{name}/com") for name in nodes), "frames of the start")
+        description = Simulator(load_scene(PARAMETERS["scene"])).description
+        topics = [spec.name for spec in output_topics(description) if not spec.name.startswith("/")]
+        topics = [f"{name}/{topic}" for name in nodes for topic in topics]
+        client.spin_until(lambda: all(map(self.count, topics)), "all of the frames of the start")
 
     def _take(self, topic, ros_type, data, information):
         self.messages.append((topic, ros_type, information["received_timestamp"], bytes(data)))
