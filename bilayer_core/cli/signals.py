@@ -68,10 +68,8 @@ def interruption_behind(error: BaseException | None) -> Interruption | None:
 class Signals:
     """The handlers of one run of the program.
 
-    Parameters
-    ----------
-    of_process : bool
-        The process ends with the program, so signals are heeded until then; otherwise `close` restores what was there.
+    `of_process`: the process ends with the program, so signals are heeded until then; otherwise `close` restores what
+    was there.
     """
 
     def __init__(self, of_process: bool):

@@ -90,10 +90,7 @@ def pieces_bar(total: int) -> Iterator[Callable[[int, int], None]]:
 def count_bar(total: int, quiet: bool) -> Iterator[Callable[[str], None]]:
     """Show a bar on stderr for many measurements. Yield a function that takes the name of the next one.
 
-    Parameters
-    ----------
-    total : int
-        How often it will be called.
+    `total`: number of calls.
     """
     if quiet or not sys.stderr.isatty():
         yield lambda text: None
@@ -118,12 +115,8 @@ def count_bar(total: int, quiet: bool) -> Iterator[Callable[[str], None]]:
 def runs_bar(total: int, there: int, quiet: bool) -> Iterator[Callable[[str], None]]:
     """Show a bar on stderr for many runs: how many are done, how many a second, the time left, how many failed.
 
-    Without a terminal, print a line now and then. Yield a function that takes the outcome of each run.
-
-    Parameters
-    ----------
-    total, there : int
-        Of the runs, and of those that are there before it begins.
+    Without a terminal, print a line now and then. Yield a function that takes the outcome of each run. `total`,
+    `there`: number of runs, and of those that are there before it begins.
     """
     if quiet:
         yield lambda outcome: None

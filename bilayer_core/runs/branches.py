@@ -38,13 +38,7 @@ class Varied:
 
     @classmethod
     def read(cls, text: str) -> Varied:
-        """Read ``NAME=FROM:TO:COUNT``: values evenly from one to another.
-
-        Raises
-        ------
-        InputError
-            If it is none.
-        """
+        """Read ``NAME=FROM:TO:COUNT``: values evenly from one to another. Raises InputError if it is none."""
         name, _, span = text.partition("=")
         parts = span.split(":")
         try:

@@ -46,11 +46,7 @@ def forecast(simulator: Simulator) -> LogSize:
     """Return the expected size of a log of the scene, as `McapRecorder` writes it.
 
     Contact forces and events are left out: nobody knows how many there will be. Frames within one step share a state.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        At its start.
+    `simulator`: at its start.
     """
     scene, strands = simulator.scene, simulator.description.strands
     encoder = FrameEncoder(simulator.description)

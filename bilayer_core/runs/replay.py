@@ -207,11 +207,7 @@ def _verified(path: Path, tolerance: float | None, derived: bool) -> Verificatio
 def simulator_of(path: str | Path, overrides: Sequence[str] = ()) -> Simulator:
     """Return a simulator of the scene in a log at the scene's start, with the step settings of the log's run.
 
-    Parameters
-    ----------
-    path : str or Path
-    overrides : sequence of str
-        Changes to the scene, ``KEY=VALUE``; those of ``solver`` come before what the run used.
+    `overrides`: changes to the scene, ``KEY=VALUE``; those of ``solver`` come before what the run used.
     """
     head = read_head(Path(path))
     settings = {key: head.settings.get(key, "") for key in ("model", "dimension", "integrator", "dt", "tolerance")}

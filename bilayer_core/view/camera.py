@@ -91,10 +91,7 @@ class Insets:
 def parse_camera(text: str) -> Camera:
     """Return the camera that an option names.
 
-    Raises
-    ------
-    InputError
-        If the option names none; the message says what is allowed.
+    Raises InputError if the option names none; the message says what is allowed.
     """
     name = text.strip().lower()
     if name in (AUTO, FOLLOW, "iso"):

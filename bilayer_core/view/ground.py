@@ -80,10 +80,7 @@ def below_edge(plane: ShapeInfo, shot: Shot, size: tuple[int, int]) -> list[tupl
 def add_plane(renderer: Any, plane: ShapeInfo, ground: Ground, theme: Theme) -> Any:
     """Draw a plane that fades into the background, or into nothing if that is transparent.
 
-    Returns
-    -------
-    vtkAssembly
-        Whose user matrix may move it.
+    Its user matrix may move it.
     """
     from vtkmodules.vtkRenderingCore import vtkActor, vtkAssembly, vtkPolyDataMapper
 

@@ -43,12 +43,7 @@ class Shown:
         return f"<img style='max-width:100%' src='data:image/{self.kind};base64,{b64encode(self.content).decode()}'>"
 
     def save(self, path: str | Path) -> None:
-        """Write it to a file.
-
-        Parameters
-        ----------
-        path : str or Path
-        """
+        """Write it to a file."""
         if Path(path).suffix.lower() != f".{self.kind}":
             raise InputError(f"{path}: must end in .{self.kind}")
         Path(path).write_bytes(self.content)

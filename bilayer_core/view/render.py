@@ -174,16 +174,8 @@ class Studio:
     ) -> Iterator[Image.Image]:
         """Return the pictures at `times` [s], with all that is written on them.
 
-        Parameters
-        ----------
-        times : sequence of float
-        insets : Insets
-        rate : float
-            Pictures a second of film; 0 if it is none.
-        texts : list of str
-            What is written on each beside the bars.
-        longest : int, optional
-            The longer side of pictures whose size is not given [pixels].
+        `rate`: pictures a second of film; 0 if it is none. `texts`: what is written on each beside the bars. `longest`:
+        the longer side of pictures whose size is not given [pixels].
         """
         return self._written(self._set(times, insets, rate, longest=longest), texts)
 

@@ -45,13 +45,8 @@ class Moment:
 class Moments:
     """A run that can be looked at between its frames, on straight lines from one to the next.
 
-    Shapes and bodies are recorded at rates of their own; so both are of exactly the time that is asked for.
-
-    Parameters
-    ----------
-    run : RunData
-    values : list of ndarray
-        What colours each of the description's layers, shape (shapes, its nodes).
+    Shapes and bodies are recorded at rates of their own; so both are of exactly the time that is asked for. `values`:
+    what colours each of the description's layers, shape (shapes, its nodes).
     """
 
     def __init__(self, run: RunData, values: list[np.ndarray]):

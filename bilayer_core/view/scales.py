@@ -105,12 +105,8 @@ def _of_rods(run: RunData) -> np.ndarray:
 def reference_of(forces: np.ndarray) -> float:
     """Return the size by which to scale arrows, 1 if there are no forces.
 
-    It is not the largest one: a few frames of impact would make all other arrows invisible.
-
-    Parameters
-    ----------
-    forces : ndarray
-        [N] or [N m], shape (times, places, 3).
+    It is not the largest one: a few frames of impact would make all other arrows invisible. `forces`: [N] or [N m],
+    shape (times, places, 3).
     """
     largest = np.linalg.norm(forces, axis=2).max(axis=1, initial=0.0)
     largest = largest[largest > 0.0]

@@ -41,12 +41,8 @@ class Theme:
 def theme_of(background: str) -> Theme:
     """Return the theme of a background.
 
-    A background is ``dark``, ``white``, ``transparent``, or a colour that Pillow knows (``#f4f1e8``).
-
-    Raises
-    ------
-    InputError
-        If it is none of these.
+    A background is ``dark``, ``white``, ``transparent``, or a colour that Pillow knows (``#f4f1e8``). Raises InputError
+    if it is none of these.
     """
     from PIL import ImageColor
 

@@ -73,10 +73,7 @@ class Commands:
     def apply(self, simulator: Simulator, ramp: Ramp) -> bool:
         """Let what waits act from now on, loads by a ramp; poses have limits of their own.
 
-        Returns
-        -------
-        bool
-            Whether anything did.
+        Returns whether anything did.
         """
         if self._begun and not self._waiting:
             return False

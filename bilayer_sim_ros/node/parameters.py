@@ -92,10 +92,7 @@ class NodeParameter:
 def accept_all(table: Iterable[NodeParameter], overrides: Mapping[str, object]) -> dict[str, Value]:
     """Return the values of all parameters in `table`: the default, or what `overrides` says.
 
-    Raises
-    ------
-    InputError
-        For a name that is not in the table, or a value that is not allowed.
+    Raises InputError for a name that is not in the table, or a value that is not allowed.
     """
     known = {parameter.name: parameter for parameter in table}
     for name in overrides:

@@ -73,14 +73,7 @@ class Status:
 
 
 class StatusReporter:
-    """Sums up steps and reports them.
-
-    Parameters
-    ----------
-    report : callable
-        Called with a `Status`.
-    pacer : Pacer
-    """
+    """Sums up steps and reports them. `report`: called with a `Status`."""
 
     def __init__(self, report: Callable[[Status], None], pacer: Pacer):
         self._report = report

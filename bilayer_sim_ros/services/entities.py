@@ -44,10 +44,6 @@ class Entities:
     """Bodies, and rods: the pose of a rod is that of its first node, with the material frame there.
 
     A rod that has the name of a body is called ``rods/<name>``.
-
-    Parameters
-    ----------
-    description : Description
     """
 
     def __init__(self, description: Description):

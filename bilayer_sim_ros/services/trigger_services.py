@@ -58,13 +58,7 @@ def _say(response: Trigger.Response, future: Future) -> None:
 
 
 class Services:
-    """Services of a node, each answered from a future; messages and other requests are served meanwhile.
-
-    Parameters
-    ----------
-    node : Node
-    services : iterable of Service
-    """
+    """Services of a node, each answered from a future; messages and other requests are served meanwhile."""
 
     def __init__(self, node: Node, services: Iterable[Service]):
         self._node = node

@@ -73,12 +73,7 @@ class Link:
 class Chain:
     """The hash of a log, message by message.
 
-    Parameters
-    ----------
-    scene_text : str
-        Scene in the log.
-    head : mapping
-        Metadata records by name; those of `HASHED` count.
+    `scene_text`: scene in the log. `head`: metadata records by name; those of `HASHED` count.
     """
 
     def __init__(self, scene_text: str, head: Mapping[str, Mapping[str, str]]):
@@ -139,16 +134,7 @@ class Wholeness:
 def check_chain(path: str | Path, description: Description) -> Wholeness:
     """Compute the hash of a log, and compare it with what the log says of it.
 
-    Parameters
-    ----------
-    path : str or Path
-    description : Description
-        That of the log.
-
-    Raises
-    ------
-    InputError
-        If the file is no log, or is damaged.
+    `description`: that of the log. Raises InputError if the file is no log, or is damaged.
     """
     path = Path(path)
     chain, links, end = _read_links(path, description.scene_text)

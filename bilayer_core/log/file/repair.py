@@ -108,18 +108,8 @@ class Repaired:
 def repair(path: str | Path, new: str | Path, force: bool = False) -> Repaired:
     """Write what can be read of a log as one that is whole; a log that is whole is copied.
 
-    Parameters
-    ----------
-    path, new : str or Path
-    force : bool
-        Replace `new` if it is there.
-
-    Raises
-    ------
-    InputError
-        If `path` is no MCAP file, or `new` is there or cannot be written.
-    OutputError
-        If writing fails; nothing is left then.
+    `force`: replace `new` if it is there. Raises InputError if `path` is no MCAP file, or `new` is there or cannot be
+    written. Raises OutputError if writing fails; nothing is left then.
     """
     path, new = Path(path), Path(new)
     if new.exists() and path.exists() and new.samefile(path):

@@ -218,14 +218,7 @@ class FrameEncoder:
 
 
 class SmallMessage:
-    """Encoder of a message with stamps and at most one array.
-
-    Parameters
-    ----------
-    template : Template
-    values : callable, optional
-        Takes that array from a frame.
-    """
+    """Encoder of a message with stamps and at most one array. `values`: takes that array from a frame."""
 
     def __init__(self, template: Template, values: Callable[[Frame], np.ndarray | list[float]] | None = None):
         self.template, self.values = template, values

@@ -70,17 +70,8 @@ def force_arrows(origins: np.ndarray, forces: np.ndarray, unit: float | np.ndarr
 
     Each arrow has a shaft and two barbs; all points of a zero force are at its origin.
 
-    Parameters
-    ----------
-    origins, forces : ndarray
-        [m, N], shape (arrows, 3).
-    unit : float or ndarray
-        Force from which arrows grow [N], of all or of each, shape (arrows,).
-
-    Returns
-    -------
-    ndarray
-        Pairs of points [m], shape (6 arrows, 3).
+    `origins`, `forces`: [m, N], shape (arrows, 3). `unit`: force from which arrows grow [N], of all or of each, shape
+    (arrows,). Returns pairs of points [m], shape (6 arrows, 3).
     """
     points = np.empty((len(forces), 6, 3))
     arrows = ArrowArrays(

@@ -178,12 +178,7 @@ def input_topics(description: Description) -> tuple[TopicSpec, ...]:
 class DisplayGate:
     """Tells which frames carry the topics of `Rate.DISPLAY`: the first one in each period of their rate.
 
-    Parameters
-    ----------
-    rate : float
-        Of frames [Hz].
-    display_rate : float
-        Wished rate of those topics [Hz]; they cannot come more often than frames.
+    `rate`: of frames [Hz]. `display_rate`: wished rate of those topics [Hz]; they cannot come more often than frames.
     """
 
     # Frames come at multiples of the time step, up to rounding; in periods.

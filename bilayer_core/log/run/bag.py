@@ -186,10 +186,7 @@ class BaggedRun:
 def choose_run(bag: Bag, number: int = 0) -> BagRun:
     """Return the only run of a bag, or that of a number.
 
-    Raises
-    ------
-    InputError
-        If there is none, or more than one, with what to say.
+    Raises InputError if there is none, or more than one, with what to say.
     """
     path = bag.files.path
     runs = [run for run in bag.runs if number in (0, run.number)]

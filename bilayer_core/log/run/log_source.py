@@ -196,11 +196,7 @@ class LogSource:
         """Yield values of quantities that come at one rate, in blocks of rows: where they are in the times, and by
         name.
 
-        Parameters
-        ----------
-        wanted : iterable of Entry
-        most : int
-            About as much is read at once [bytes].
+        `most`: about as much is read at once [bytes].
         """
         queues: dict[str, _Queue] = {}
         for entry in wanted:

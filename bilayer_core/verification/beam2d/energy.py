@@ -63,15 +63,8 @@ class Strains:
 class BeamEnergy:
     """Elastic energy of nodes in a plane, its gradient and its Hessian.
 
-    Parameters
-    ----------
-    section : Section
-    edge_length : float
-        |ē| [m].
-    node_count : int
-    wall : Array or None
-        Unit direction that a clamp at the first node fixes, shape (2,); the wall stands at the node, with a bending
-        element of half an edge. None for a free end.
+    `edge_length`: |ē| [m]. `wall`: unit direction that a clamp at the first node fixes, shape (2,); the wall stands at
+    the node, with a bending element of half an edge. None for a free end.
     """
 
     def __init__(self, section: Section, edge_length: float, node_count: int, wall: Array | None):
@@ -123,12 +116,7 @@ class BeamEnergy:
     def value(self, position: Array, force: Array, moment: Array) -> float:
         """Return E [J].
 
-        Parameters
-        ----------
-        position : Array
-            [m], shape (n_node, 2).
-        force, moment : Array
-            N [N] and M [N m] of each edge, shape (n_edge,).
+        `position`: [m], shape (n_node, 2). `force`, `moment`: N [N] and M [N m] of each edge, shape (n_edge,).
         """
         s, at = self.section, self.strains(position)
         stretching = (0.5 * s.axial * at.axial - force) @ at.axial * self.edge_length

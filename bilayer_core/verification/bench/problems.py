@@ -218,13 +218,7 @@ PROBLEMS = (
 
 
 def problem(name: str) -> Problem:
-    """Return the problem of this name.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """Return the problem of this name. Raises InputError if there is none."""
     names = [each.name for each in PROBLEMS]
     if name not in names:
         raise InputError(f"{name}: no such problem{suggestion(name, names)}; there are {', '.join(names)}")
