@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 
 from bilayer_core.errors import BilayerError
 
@@ -56,6 +57,21 @@ class Case:
         scale = abs(reference) if self.scale is None else self.scale
         error = abs(computed - reference) / scale
         return Result(self, computed, reference, error, clock.process_time() - begin, message)
+
+
+def cases(
+    name: str,
+    against: str,
+    limit: float,
+    measure: Callable[..., tuple[float, float]],
+    over: Iterable[object],
+    unit: str = "1",
+    scale: float | None = None,
+    long: bool = False,
+) -> list[Case]:
+    """Return a case for each value or tuple in `over`: they stand in the braces of `name`, and `measure` takes them."""
+    each = [values if isinstance(values, tuple) else (values,) for values in over]
+    return [Case(name.format(*values), against, limit, partial(measure, *values), unit, scale, long) for values in each]
 
 
 @dataclass(frozen=True)
