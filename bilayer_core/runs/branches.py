@@ -55,21 +55,11 @@ class Varied:
 
 @dataclass(frozen=True)
 class Branch:
-    """One of the runs.
+    """One of the runs."""
 
-    Attributes
-    ----------
-    value : float
-        Of what differs.
-    run : RunData
-        From the instant on.
-    stopped : str
-        Why it could not go on to the end; empty if it did.
-    """
-
-    value: float
-    run: RunData
-    stopped: str
+    value: float  # Of what differs
+    run: RunData  # From the instant on
+    stopped: str  # Why it could not go on to the end; empty if it did
 
 
 def run_branches(

@@ -28,18 +28,10 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class LogSize:
-    """Expected size of a log with a state in every frame, the most there can be.
+    """Expected size of a log with a state in every frame, the most there can be."""
 
-    Attributes
-    ----------
-    per_second : float
-        Of simulated time [bytes].
-    total : float
-        For the scene's duration [bytes].
-    """
-
-    per_second: float
-    total: float
+    per_second: float  # Of simulated time [bytes]
+    total: float  # For the scene's duration [bytes]
 
 
 def forecast(simulator: Simulator) -> LogSize:

@@ -20,21 +20,11 @@ Overrides = Sequence[str] | Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Override:
-    """A change of one value of a scene.
+    """A change of one value of a scene."""
 
-    Attributes
-    ----------
-    keys : tuple of str
-        To the value; items of a list are addressed by their name or their index.
-    value : object
-        As YAML has it.
-    text : str
-        What the user gave, for messages.
-    """
-
-    keys: tuple[str, ...]
-    value: Any
-    text: str
+    keys: tuple[str, ...]  # To the value; items of a list are addressed by their name or their index
+    value: Any  # As YAML has it
+    text: str  # What the user gave, for messages
 
     @property
     def origin(self) -> str:

@@ -26,17 +26,11 @@ HEIGHT = 480
 
 @dataclass(frozen=True)
 class Shown:
-    """A picture or an animation, which notebooks show.
-
-    Attributes
-    ----------
-    content : bytes
-    kind : str
-        ``png`` or ``webp``.
-    """
+    """A picture or an animation, which notebooks show."""
 
     content: bytes = field(repr=False)
     kind: str
+    """``png`` or ``webp``."""
 
     def _repr_html_(self) -> str:
         """Return it for notebooks."""

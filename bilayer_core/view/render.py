@@ -40,25 +40,13 @@ DEEPEST = 40.0  # radius of the ground, in sizes of the robot: squares of a run 
 
 @dataclass(frozen=True)
 class Look:
-    """How pictures look, as `bilayer render` is asked for it.
-
-    Attributes
-    ----------
-    camera : Camera
-    theme : Theme
-    colour : str
-        One of `colouring.QUANTITIES`.
-    size : tuple of int or None
-        Width and height; None suits what is to be seen.
-    reactions : bool
-        Whether to draw the forces and moments of rods on the bodies that hold them.
-    """
+    """How pictures look, as `bilayer render` is asked for it."""
 
     camera: Camera
     theme: Theme
-    colour: str = STRAIN
-    size: tuple[int, int] | None = None
-    reactions: bool = False
+    colour: str = STRAIN  # One of `colouring.QUANTITIES`
+    size: tuple[int, int] | None = None  # Width and height; None suits what is to be seen
+    reactions: bool = False  # Whether to draw the forces and moments of rods on the bodies that hold them
 
     @classmethod
     def of(cls, camera: str = AUTO, background: str = "dark", **others: object) -> Look:

@@ -16,30 +16,18 @@ BESIDE = 1.5
 
 @dataclass(frozen=True)
 class Moment:
-    """A run at one time.
+    """A run at one time."""
 
-    Attributes
-    ----------
-    time : float
-        [s].
-    positions, contact_forces : ndarray
-        Of every node [m, N], shape (node_count, 3).
-    material_frames : ndarray
-        Quaternions at the nodes of strands, shape (strand nodes, 4).
-    values : tuple of ndarray
-        What colours each layer, shape (its nodes,).
-    body_positions, body_quaternions, clamp_wrenches : ndarray
-        [m], x y z w, [N, N m], shapes (bodies, 3 | 4 | 6).
-    """
-
-    time: float
+    time: float  # [s]
     positions: np.ndarray
     contact_forces: np.ndarray
-    material_frames: np.ndarray
-    values: tuple[np.ndarray, ...]
+    """`positions`, `contact_forces`: of every node [m, N], shape (node_count, 3)."""
+    material_frames: np.ndarray  # Quaternions at the nodes of strands, shape (strand nodes, 4)
+    values: tuple[np.ndarray, ...]  # What colours each layer, shape (its nodes,)
     body_positions: np.ndarray
     body_quaternions: np.ndarray
     clamp_wrenches: np.ndarray
+    """`body_positions`, `body_quaternions`, `clamp_wrenches`: [m], x y z w, [N, N m], shapes (bodies, 3 | 4 | 6)."""
 
 
 class Moments:

@@ -30,34 +30,17 @@ def rounded_up(value: float) -> float:
 
 @dataclass(frozen=True)
 class Scales:
-    """How quantities become lengths and colours.
+    """How quantities become lengths and colours."""
 
-    Attributes
-    ----------
-    strain_limit : float
-        Strain of the fullest colours.
-    metres_per_newton : float
-        Length of contact arrows.
-    shown_force : float
-        Smallest force that has an arrow [N].
-    size : float
-        Of the robot at the start: the longest edge of its box [m].
-    cell : float
-        Edge of the squares on the ground [m].
-    eye, target : ndarray
-        From where to where a picture looks [m], shape (3,).
-    extent : float
-        Half the diagonal of the box of all that moves [m].
-    """
-
-    strain_limit: float
-    metres_per_newton: float
-    shown_force: float
-    size: float
-    cell: float
+    strain_limit: float  # Strain of the fullest colours
+    metres_per_newton: float  # Length of contact arrows
+    shown_force: float  # Smallest force that has an arrow [N]
+    size: float  # Of the robot at the start: the longest edge of its box [m]
+    cell: float  # Edge of the squares on the ground [m]
     eye: np.ndarray
     target: np.ndarray
-    extent: float
+    """`eye`, `target`: from where to where a picture looks [m], shape (3,)."""
+    extent: float  # Half the diagonal of the box of all that moves [m]
 
 
 def choose_scales(run: RunData) -> Scales:

@@ -25,24 +25,13 @@ LAST_ANSWERS = 1.0
 
 @dataclass(frozen=True)
 class Service:
-    """One service.
+    """One service."""
 
-    Attributes
-    ----------
-    name : str
-        Under the node's own.
-    type : type
-        Of requests and responses.
-    ask : callable
-        Has what a request says done; returns the future of what came of it. `BilayerError` is a refusal.
-    answer : callable
-        Writes that into a response, from the future, which is done.
-    """
-
-    name: str
-    type: type
+    name: str  # Under the node's own
+    type: type  # Of requests and responses
     ask: Callable[[Any], Future]
-    answer: Callable[[Any, Future], None]
+    """Has what a request says done; returns the future of what came of it. `BilayerError` is a refusal."""
+    answer: Callable[[Any, Future], None]  # Writes that into a response, from the future, which is done
 
 
 def trigger(name: str, ask: Callable[[], Future]) -> Service:

@@ -114,21 +114,11 @@ def place_in_state(description: Description, part: str) -> int | None:
 
 @dataclass(frozen=True)
 class Wholeness:
-    """Verdict of a log's hash on its states and inputs.
+    """Verdict of a log's hash on its states and inputs."""
 
-    Attributes
-    ----------
-    hashed : bool
-        Whether the log has a hash; older ones have none.
-    whole : bool
-        Whether all states and inputs that were written are there, unchanged, to the end of the run.
-    reason : str
-        What is wrong, as a sentence; empty where nothing is.
-    """
-
-    hashed: bool
-    whole: bool
-    reason: str = ""
+    hashed: bool  # Whether the log has a hash; older ones have none
+    whole: bool  # Whether all states and inputs that were written are there, unchanged, to the end of the run
+    reason: str = ""  # What is wrong, as a sentence; empty where nothing is
 
 
 def check_chain(path: str | Path, description: Description) -> Wholeness:

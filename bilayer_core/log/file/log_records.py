@@ -66,20 +66,11 @@ class DamagedChunk(ValueError):
 
 @dataclass(frozen=True)
 class Place:
-    """Where a record is.
-
-    Attributes
-    ----------
-    opcode : int
-    offset : int
-        Of its content, from the beginning of the file [bytes].
-    length : int
-        Of its content [bytes].
-    """
+    """Where a record is."""
 
     opcode: int
-    offset: int
-    length: int
+    offset: int  # Of its content, from the beginning of the file [bytes]
+    length: int  # Of its content [bytes]
 
     @property
     def begin(self) -> int:

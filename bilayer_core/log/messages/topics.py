@@ -32,24 +32,12 @@ class Rate(Enum):
 
 @dataclass(frozen=True)
 class TopicSpec:
-    """One topic.
+    """One topic."""
 
-    Attributes
-    ----------
-    name : str
-        Relative to the node's namespace, or absolute with a leading slash.
-    type : str
-        ROS type, for example ``"geometry_msgs/msg/PoseArray"``.
-    rate : Rate
-        How often it is sent.
-    depth : int
-        History depth of its quality of service; all topics are reliable and volatile.
-    """
-
-    name: str
-    type: str
-    rate: Rate
-    depth: int = 10
+    name: str  # Relative to the node's namespace, or absolute with a leading slash
+    type: str  # ROS type, for example ``"geometry_msgs/msg/PoseArray"``
+    rate: Rate  # How often it is sent
+    depth: int = 10  # History depth of its quality of service; all topics are reliable and volatile
 
     def full_name(self, namespace: str = LOG_NAMESPACE) -> str:
         """Return the absolute name under `namespace`."""

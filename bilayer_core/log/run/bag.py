@@ -27,34 +27,17 @@ MOST_LISTED = 8
 
 @dataclass(frozen=True)
 class BagRun:
-    """A run that a bag holds.
+    """A run that a bag holds."""
 
-    Attributes
-    ----------
-    node : str
-        Full name of the node.
-    number : int
-        Of the run, from 1: a reset of the node begins another one.
-    of : int
-        How many of them there are.
-    start_time, last_time : float
-        Simulated [s].
-    described : bool
-        Whether the bag holds the node's description.
-    stamped : bool
-        Whether it holds messages with stamps; otherwise times are those since the first message.
-    certain : bool
-        Whether messages without stamps have the times of their frames for certain.
-    """
-
-    node: str
-    number: int
-    of: int
+    node: str  # Full name of the node
+    number: int  # Of the run, from 1: a reset of the node begins another one
+    of: int  # How many of them there are
     start_time: float
     last_time: float
-    described: bool
-    stamped: bool
-    certain: bool
+    """`start_time`, `last_time`: simulated [s]."""
+    described: bool  # Whether the bag holds the node's description
+    stamped: bool  # Whether it holds messages with stamps; otherwise times are those since the first message
+    certain: bool  # Whether messages without stamps have the times of their frames for certain
 
     @property
     def address(self) -> str:

@@ -39,25 +39,14 @@ class Section:
 
 @dataclass(frozen=True)
 class Strains:
-    """Strains at one shape, with what their derivatives need.
+    """Strains at one shape, with what their derivatives need."""
 
-    Attributes
-    ----------
-    length : Array
-        |e| [m], shape (n_edge,).
-    tangent, normal : Array
-        Unit, shape (n_edge, 2); the normal is the tangent turned by a quarter to the left.
-    axial : Array
-        ε, shape (n_edge,).
-    bend : Array
-        χ Δl = 2 tan(φ/2), shape (n_bend,).
-    """
-
-    length: Array
+    length: Array  # |e| [m], shape (n_edge,)
     tangent: Array
     normal: Array
-    axial: Array
-    bend: Array
+    """`tangent`, `normal`: unit, shape (n_edge, 2); the normal is the tangent turned by a quarter to the left."""
+    axial: Array  # ε, shape (n_edge,)
+    bend: Array  # χ Δl = 2 tan(φ/2), shape (n_bend,)
 
 
 class BeamEnergy:

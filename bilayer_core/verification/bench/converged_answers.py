@@ -48,24 +48,12 @@ DIGITS = 9
 
 @dataclass(frozen=True)
 class Reference:
-    """A converged answer.
+    """A converged answer."""
 
-    Attributes
-    ----------
-    values : Array
-        As the problem's measure gives them.
-    bar : float
-        Half width of its error bar, measured as errors of runs are.
-    check : str
-        The second method.
-    difference : float
-        How far the second method is from it, measured likewise.
-    """
-
-    values: Array
-    bar: float
-    check: str
-    difference: float
+    values: Array  # As the problem's measure gives them
+    bar: float  # Half width of its error bar, measured as errors of runs are
+    check: str  # The second method
+    difference: float  # How far the second method is from it, measured likewise
 
 
 def stored(problem: Problem, model: str) -> Reference:
