@@ -31,6 +31,8 @@ from functools import cache
 from itertools import product
 
 import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
@@ -102,9 +104,6 @@ def _next(simulator: Simulator, dt: float, figure) -> float:
 
 def _pulled_height(force: float) -> float:
     """Return half the height of a pulled ring [m], from the equation of its quarter."""
-    from scipy.integrate import solve_ivp
-    from scipy.optimize import brentq
-
     length, pull = 0.5 * math.pi * RADIUS, 0.5 * force / BENDING
 
     def quarter(curvature: float) -> Array:
