@@ -21,16 +21,10 @@ class Interrupt:
     """Turns the first signal that asks the program to end into a wish that is granted after the step.
 
     The next one is not put off: it goes to the handler that was there before.
-
-    Attributes
-    ----------
-    wished : int or None
-        The number of the signal.
-    granted : bool
     """
 
     def __init__(self):
-        self.wished: int | None = None
+        self.wished: int | None = None  # The number of the signal
         self.granted = False
 
     def __enter__(self) -> Interrupt:

@@ -61,23 +61,8 @@ def _offscreen() -> Any:
 class Window:
     """Draws what is added to its renderer.
 
-    Parameters
-    ----------
-    theme : Theme
-        Of the background.
-    size : tuple of int
-        Width and height of whole pictures.
-    clear : bool
-        Whether pictures have no background, to be laid over others.
-
-    Attributes
-    ----------
-    renderer : vtkRenderer
-
-    Raises
-    ------
-    InputError
-        If VTK or a driver is missing.
+    `theme`: of the background. `size`: width and height of whole pictures. `clear`: whether pictures have no
+    background, to be laid over others. Raises InputError if VTK or a driver is missing.
     """
 
     def __init__(self, theme: Theme, size: tuple[int, int], clear: bool):

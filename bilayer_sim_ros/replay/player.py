@@ -85,13 +85,6 @@ class Player:
         Called with how much later than the rate asks messages have become in all [s], when that grows.
     finished : callable
         Called at the very end, in the player's thread.
-
-    Attributes
-    ----------
-    error : Exception or None
-        Why playing ended, unless it was stopped or reached the end.
-    lag : float
-        How much later than the rate asks messages have become in all [s of real time].
     """
 
     def __init__(
@@ -120,8 +113,8 @@ class Player:
         self._requests = Requests("playing has ended")
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._work, name="player")
-        self.error: Exception | None = None
-        self.lag = 0.0
+        self.error: Exception | None = None  # Why playing ended, unless it was stopped or reached the end
+        self.lag = 0.0  # How much later than the rate asks messages have become in all [s of real time]
 
     def start(self) -> None:
         """Start the thread."""

@@ -124,16 +124,7 @@ def deleting_all_first(message: bytes) -> bytes:
 class MarkerEncoder:
     """Encodes frames as ``visualization_msgs/MarkerArray``; the only marker of changing size, arrows, comes last.
 
-    Parameters
-    ----------
-    description : Description
-    node_frames : NodeFrames
-        Of the same model.
-
-    Attributes
-    ----------
-    template : Template
-        The message without contact forces.
+    `node_frames`: of the same model.
     """
 
     def __init__(self, description: Description, node_frames: NodeFrames):
@@ -189,7 +180,7 @@ class MarkerEncoder:
         self._arrows_start = len(template)
         template.put("<u4", 0)  # colours: none, the marker's own counts
         _tail(template)
-        self.template = template
+        self.template = template  # The message without contact forces
 
         views = template.views()
         self._arrow_action, self._arrow_count = views["arrows"], views["arrow_count"]
