@@ -157,7 +157,7 @@ class StimulusInputs:
         """Take something else than a stimulus, and where ticks wait for it, as an answer to one.
 
         `name`: as in `Answers`. `tick`: the one that it answers [ns]; None for the open one. `take`: called if it
-        counts; `changes`, which comes first at a tick, waits until it has been. Returns as from `receive_stamped`.
+        counts; `changes`, which comes first at a tick, waits until it has been. Returns what `receive_stamped` does.
         """
         if self._answers is None or not self._answers.waits_for(name):
             take()
