@@ -7,6 +7,7 @@ import time
 from contextlib import suppress
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import rclpy
 from rcl_interfaces.srv import GetParameters, GetParameterTypes, SetParameters
@@ -15,9 +16,10 @@ from rclpy.executors import SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
-from support import forked
+from support import forked, synthetic_run
 from support.processes import claimed_domain
 
+from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_sim_ros.simulation_node import SimulationNode
 
 NODE = "/bilayer_sim"
@@ -229,6 +231,14 @@ def domain(residents):
 @pytest.fixture(scope="module")
 def domain_of_module(residents):
     yield from inhabited(residents)
+
+
+@pytest.fixture(scope="module")
+def run_log(tmp_path_factory):
+    """Half a second of a run, all topics."""
+    path = tmp_path_factory.mktemp("logs") / "run.mcap"
+    synthetic_run.run(McapRecorder(path, 50.0, 20.0), np.linspace(0.0, 0.5, 26))
+    return path
 
 
 @pytest.fixture

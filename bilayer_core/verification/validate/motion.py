@@ -58,13 +58,20 @@ def _spin_lost(integrator: str, dt: float) -> float:
     gel = {"youngs_modulus": 1e5, "poisson_ratio": 0.5, "density": 1000.0}
     solver = {"dt": dt, "integrator": integrator, "newton_tolerance": 1e-11}
     simulator = Simulator(load_scene(scene([ribbon], materials={"gel": gel}, solver=solver)))
+    return change_of_spin(simulator, 0.0, 0.05)
+
+
+def change_of_spin(simulator: Simulator, settling: float, duration: float) -> float:
+    """Let a strip go at 20 rad/s; return the change of its angular momentum in a time [s] after another, over it."""
     let_go(simulator, np.cross([0, 0, 20.0], simulator.positions))
 
     def momentum() -> float:
         return float(simulator.model.rods.node_mass @ np.cross(simulator.positions, simulator.velocities)[:, 2])
 
+    if settling:
+        simulator.run(settling)
     before = momentum()
-    simulator.run(0.05)
+    simulator.run(duration)
     return momentum() / before - 1.0
 
 

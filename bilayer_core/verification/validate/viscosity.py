@@ -10,7 +10,7 @@ from scipy.optimize import curve_fit
 from bilayer_core.integrators.integrator_register import INTEGRATORS
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
-from bilayer_core.verification.validate.motion import let_go
+from bilayer_core.verification.validate.motion import change_of_spin, let_go
 from bilayer_core.verification.validate.parts import fixed, layer, rod, scene
 from bilayer_core.verification.validate.validation_case import Case, cases
 
@@ -83,15 +83,7 @@ def spun(integrator: str) -> float:
     ribbon = rod([layer(thickness=2e-3)], length=LENGTH, stations=11, start=(-0.5 * LENGTH, 0, 0))
     solver = {"dt": 1e-3, "integrator": integrator, "newton_tolerance": 1e-11}
     simulator = Simulator(load_scene(scene([ribbon], materials={"gel": gel(0.01, 1e5)}, solver=solver)))
-    let_go(simulator, np.cross([0, 0, 20.0], simulator.positions))
-
-    def momentum() -> float:
-        return float(simulator.model.rods.node_mass @ np.cross(simulator.positions, simulator.velocities)[:, 2])
-
-    simulator.run(0.5)
-    before = momentum()
-    simulator.run(0.5)
-    return momentum() / before - 1.0
+    return change_of_spin(simulator, 0.5, 0.5)
 
 
 def order(integrator: str, time: float = 1e-3, steps: tuple[float, ...] = (1e-3, 5e-4, 2.5e-4)) -> tuple[float, float]:
