@@ -29,12 +29,8 @@ _FOR_DEVELOPERS = "test"
 def require(what: str, *modules: str) -> None:
     """Raise InputError, with the command that installs them, if a library is missing.
 
-    Parameters
-    ----------
-    what : str
-        The command, option or function that needs the libraries, for the message.
-    *modules : str
-        Names by which the libraries are imported.
+    `what`: the command, option or function that needs the libraries, for the message. `*modules`: names by which the
+    libraries are imported.
     """
     missing = [module for module in modules if find_spec(module) is None]
     if missing:

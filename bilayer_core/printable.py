@@ -20,11 +20,7 @@ MORE = "..."
 def shortened(text: str, most: int = LONGEST_TEXT) -> str:
     """Return a text in one line that can be printed, cut off where it gets long.
 
-    Parameters
-    ----------
-    text : str
-    most : int
-        Characters after which it is cut off.
+    `most`: characters after which it is cut off.
     """
     if len(text) <= most and text.isprintable():
         return text

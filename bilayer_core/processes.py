@@ -32,13 +32,8 @@ def side_by_side(
     what still works is ended, and what waits is cancelled. The processes do not hear Ctrl-C, which is for who started
     them.
 
-    Parameters
-    ----------
-    count : int
-    tasks_each : int
-        After which another process takes the place of one; 0 for never.
-    prepare : callable, optional
-        Called in each process first.
+    `tasks_each`: after which another process takes the place of one; 0 for never. `prepare`: called in each process
+    first.
     """
     from pebble import ProcessPool
 

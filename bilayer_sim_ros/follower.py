@@ -121,22 +121,7 @@ def _say(line: str) -> None:
 class Listener:
     """Hands what a node publishes to a view.
 
-    Parameters
-    ----------
-    name : str
-        Full name of the node.
-    view : LiveView
-
-    Attributes
-    ----------
-    node : rclpy.node.Node
-    topic : str
-        Full name of the topic of frames.
-
-    Raises
-    ------
-    InputError
-        If there can be no node of this name.
+    `name`: full name of the node. Raises InputError if there can be no node of this name.
     """
 
     def __init__(self, name: str, view):
@@ -149,7 +134,7 @@ class Listener:
         from bilayer_sim_ros.publishing.live_topic import KEPT
 
         name = name if name.startswith("/") else f"/{name}"
-        self.topic = LIVE.full_name(name)
+        self.topic = LIVE.full_name(name)  # Full name of the topic of frames
         self._view, self._last, self._begun = view, -1, False
         self._description, self._taken = None, 0
         self.node = Node(f"bilayer_view_{os.getpid()}")

@@ -6,6 +6,7 @@ import click
 
 from bilayer_core.cli.options import Verb
 from bilayer_core.cli.terminal import say
+from bilayer_core.errors import InputError
 
 TABLE = "A table FILE{0} of all but nodes of rods, or a directory with a file of each quantity."
 
@@ -25,7 +26,6 @@ def export(
     Units stand in the first line of csv files (com.z [m]), in the metadata of parquet files, and in npz under `units`.
     What is of the nodes of a rod has a row for each node at each time.
     """
-    from bilayer_core.errors import InputError
     from bilayer_core.log.run.export import CSV, NPZ, PARQUET, export
 
     wanted = {CSV: csv, PARQUET: parquet, NPZ: npz}

@@ -21,10 +21,7 @@ def json_option(help: str) -> Callable:
 def json_to(path: str | None, force: bool = True) -> Iterator[Callable[[str], None]]:
     """Yield a function that takes the text, once. If `path` is ``-``, all prints meanwhile go to standard error.
 
-    Raises
-    ------
-    InputError
-        At once, if the file cannot be written, or is there and `force` is not given.
+    Raises InputError at once if the file cannot be written, or is there and `force` is not given.
     """
     from bilayer_core.log.file.output_paths import check_output_path, write_text
 

@@ -8,6 +8,7 @@ import click
 
 from bilayer_core.cli.options import Verb
 from bilayer_core.cli.terminal import say
+from bilayer_core.errors import InputError
 
 
 class NewVerb(Verb):
@@ -28,7 +29,6 @@ class NewVerb(Verb):
 @click.option("--force", is_flag=True, help="Replace an existing file.")
 def new(file: str, template: str | None, origin: str | None, force: bool) -> None:
     """Write a scene to start from: complete, with comments, ready to run."""
-    from bilayer_core.errors import InputError
     from bilayer_core.log.file.output_paths import check_output_path, write_text
     from bilayer_core.scene.new import DEFAULT_TEMPLATE, new_scene
 

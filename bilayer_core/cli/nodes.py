@@ -17,13 +17,7 @@ FOLLOWER = "bilayer_sim_ros.follower"
 
 
 def become_replay_node(log: str, rate: float | None, loop: bool) -> NoReturn:
-    """Play a log on ROS topics, in place of this program.
-
-    Raises
-    ------
-    InputError
-        For a rate that is not above 0.
-    """
+    """Play a log on ROS topics, in place of this program. Raises InputError for a rate that is not above 0."""
     if rate is not None and not (math.isfinite(rate) and rate > 0.0):
         raise InputError(f"--rate: {rate:g} is not allowed; it must be a finite number > 0")
     named = f"./{log}" if log.startswith("-") else log  # no option
@@ -36,12 +30,8 @@ def become_replay_node(log: str, rate: float | None, loop: bool) -> NoReturn:
 def become_follower(node: str, options: Mapping[str, object], flags: Mapping[str, bool]) -> NoReturn:
     """Show what a node publishes while it goes on, in place of this program.
 
-    Parameters
-    ----------
-    node : str
-        Its full name.
-    options, flags : mapping
-        By their names on the command line; those that are None or False are left out.
+    `node`: its full name. `options`, `flags`: by their names on the command line; those that are None or False are left
+    out.
     """
     command = [sys.executable, "-m", FOLLOWER, f"--node={node}"]
     command += [f"{name}={value}" for name, value in options.items() if value is not None]

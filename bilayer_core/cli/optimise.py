@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import click
@@ -45,8 +46,6 @@ def optimise(
     The best run is made again at a tenth of the tolerance: exit code 1 if its metric differs by more than 2 %. Writes
     results as `bilayer sweep` does, and DIR/best.yaml, a scene for `bilayer run`.
     """
-    from pathlib import Path
-
     from bilayer_core.extras import require
     from bilayer_core.studies.sweeps import optimise as search
     from bilayer_core.studies.sweeps.plots import draw

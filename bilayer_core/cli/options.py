@@ -40,11 +40,8 @@ def _debug_option() -> click.Option:
 class Verb(click.Command):
     """A command that takes --debug after its name too.
 
-    Parameters
-    ----------
-    old_spellings : mapping
-        Options of earlier releases that are not in the help, such as ``"--time"`` to ``"--at"``; they work on for this
-        one, with a note.
+    `old_spellings`: options of earlier releases that are not in the help, such as ``"--time"`` to ``"--at"``; they work
+    on for this one, with a note.
     """
 
     def __init__(self, *arguments: Any, old_spellings: Mapping[str, str] | None = None, **settings: Any):
@@ -123,13 +120,7 @@ def say_renamed(old: str, new: str) -> None:
 
 
 def output_directory(out: str) -> Path:
-    """Return the directory of ``--out``; create it if it does not exist.
-
-    Raises
-    ------
-    InputError
-        If it cannot be created.
-    """
+    """Return the directory of ``--out``; create it if it does not exist. Raises InputError if it cannot be created."""
     directory = Path(out)
     try:
         directory.mkdir(parents=True, exist_ok=True)

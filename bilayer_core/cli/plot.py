@@ -10,6 +10,7 @@ import click
 
 from bilayer_core.cli.options import Verb
 from bilayer_core.cli.terminal import say
+from bilayer_core.errors import InputError
 
 SUFFIX = ".mcap"
 
@@ -58,7 +59,6 @@ def plot(
     Quantities of one unit share a panel; those of several logs are drawn over each other. `bilayer info LOG
     --quantities` lists all names.
     """
-    from bilayer_core.errors import InputError
     from bilayer_core.view.plot import WIDTHS, Axis, plot
 
     logs = [word for word in logs_and_quantities if _is_log(word)]
@@ -86,8 +86,6 @@ def _is_log(word: str) -> bool:
 
 
 def _millimetres(width: str) -> float:
-    from bilayer_core.errors import InputError
-
     try:
         found = float(width.removesuffix("mm"))
     except ValueError:

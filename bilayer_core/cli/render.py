@@ -9,6 +9,7 @@ import click
 
 from bilayer_core.cli.options import Duration, Verb
 from bilayer_core.cli.terminal import say
+from bilayer_core.errors import InputError
 
 SHEET_PICTURES = 6
 MOST_PICTURES = 400
@@ -95,7 +96,6 @@ def render(
     force: bool,
 ) -> None:
     """Draw a run without a screen: the robot alone, with a colour bar and a scale bar."""
-    from bilayer_core.errors import InputError
     from bilayer_core.log.file.output_paths import check_output_path
 
     wanted = {"--png": png, "--sheet": sheet, "--gif": gif, "--mp4": mp4}
@@ -155,8 +155,6 @@ def _moments(
     studio: Any, times: tuple[float, ...], frames: int | None, rate: float, speed: float | None, longest: float
 ) -> tuple[list[float], str]:
     """Return the times of a film's pictures [s] and a note about its speed."""
-    from bilayer_core.errors import InputError
-
     span = studio.last - studio.first
     if times:
         return list(times), ""

@@ -20,14 +20,8 @@ def choices(report: dict[str, Any]) -> Iterator[tuple[str, str]]:
 def summary_lines(summary: dict[str, Any], moved: set[str], verbose: bool) -> Iterator[str]:
     """Yield three lines that tell how a run went, what came of it and how good it is, then what to be aware of.
 
-    Parameters
-    ----------
-    summary : dict
-        As `Simulator.summary` gives it.
-    moved : set of str
-        Names of the bodies that forces may lift.
-    verbose : bool
-        Whether a line for each figure comes instead of the second and the third.
+    `summary`: as `Simulator.summary` gives it. `moved`: names of the bodies that forces may lift. `verbose`: whether a
+    line for each figure comes instead of the second and the third.
     """
     factor = summary["real_time_factor"]
     times = f", {factor:.3g} times as fast as real time" if factor else ""

@@ -259,10 +259,7 @@ def _write_outputs(
 ) -> BilayerError | None:
     """Write the last state and the summary, each whatever happened before.
 
-    Returns
-    -------
-    BilayerError or None
-        The first failure, which `failure` is if there was one; later ones are notes to it.
+    Returns the first failure, which `failure` is if there was one; later ones are notes to it.
     """
     from bilayer_core.log.file.output_paths import write_text
     from bilayer_core.log.run.state_file import write_state

@@ -31,22 +31,13 @@ class Interruption(BaseException):
 
     It is no `KeyboardInterrupt`: click answers that with an empty line, and Python may end with another exit code even
     where one was caught.
-
-    Attributes
-    ----------
-    number : int
-        Of the signal.
-    exit_code : int
-        As shells count: 128 and the number of the signal.
-    heeded : bool
-        Whether who has caught it ends soon; who has not gets it again.
     """
 
     def __init__(self, number: int):
         super().__init__(WORDS[number])
-        self.number = number
-        self.exit_code = 128 + number
-        self.heeded = False
+        self.number = number  # Of the signal
+        self.exit_code = 128 + number  # As shells count: 128 and the number of the signal
+        self.heeded = False  # Whether who has caught it ends soon; who has not gets it again
 
 
 def interruption_behind(error: BaseException | None) -> Interruption | None:
@@ -68,10 +59,8 @@ def interruption_behind(error: BaseException | None) -> Interruption | None:
 class Signals:
     """The handlers of one run of the program.
 
-    Parameters
-    ----------
-    of_process : bool
-        The process ends with the program, so signals are heeded until then; otherwise `close` restores what was there.
+    `of_process`: the process ends with the program, so signals are heeded until then; otherwise `close` restores what
+    was there.
     """
 
     def __init__(self, of_process: bool):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
@@ -173,8 +174,6 @@ def _list(read: Any) -> None:
 
 def reasons(result: Any, most: int = 5) -> list[str]:
     """Return the lines about runs that are not done: the commonest reasons, each with how many."""
-    from collections import Counter
-
     counted: Counter[str] = Counter()
     numbers: dict[str, int] = {}
     for row in result.rows:

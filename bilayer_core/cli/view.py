@@ -9,6 +9,7 @@ import click
 
 from bilayer_core.cli.options import Duration, Verb
 from bilayer_core.cli.terminal import say
+from bilayer_core.errors import InputError
 
 NODE = "/bilayer_sim"
 FOLLOWING = ("node", "bind", "port", "serve")
@@ -37,7 +38,6 @@ FOLLOWING = ("node", "bind", "port", "serve")
 @click.option("--force", is_flag=True, help="Replace existing files.")
 def view(file: str | None, follow: bool, **options: Any) -> None:
     """Show a run in rerun; with --follow one that goes on."""
-    from bilayer_core.errors import InputError
     from bilayer_core.log.file.output_paths import check_output_path
     from bilayer_core.view.colouring import STRAIN
 

@@ -21,16 +21,10 @@ class Interrupt:
     """Turns the first signal that asks the program to end into a wish that is granted after the step.
 
     The next one is not put off: it goes to the handler that was there before.
-
-    Attributes
-    ----------
-    wished : int or None
-        The number of the signal.
-    granted : bool
     """
 
     def __init__(self):
-        self.wished: int | None = None
+        self.wished: int | None = None  # The number of the signal
         self.granted = False
 
     def __enter__(self) -> Interrupt:
@@ -90,10 +84,7 @@ def pieces_bar(total: int) -> Iterator[Callable[[int, int], None]]:
 def count_bar(total: int, quiet: bool) -> Iterator[Callable[[str], None]]:
     """Show a bar on stderr for many measurements. Yield a function that takes the name of the next one.
 
-    Parameters
-    ----------
-    total : int
-        How often it will be called.
+    `total`: number of calls.
     """
     if quiet or not sys.stderr.isatty():
         yield lambda text: None
@@ -118,12 +109,8 @@ def count_bar(total: int, quiet: bool) -> Iterator[Callable[[str], None]]:
 def runs_bar(total: int, there: int, quiet: bool) -> Iterator[Callable[[str], None]]:
     """Show a bar on stderr for many runs: how many are done, how many a second, the time left, how many failed.
 
-    Without a terminal, print a line now and then. Yield a function that takes the outcome of each run.
-
-    Parameters
-    ----------
-    total, there : int
-        Of the runs, and of those that are there before it begins.
+    Without a terminal, print a line now and then. Yield a function that takes the outcome of each run. `total`,
+    `there`: number of runs, and of those that are there before it begins.
     """
     if quiet:
         yield lambda outcome: None

@@ -118,13 +118,7 @@ def holds(name: str) -> bool:
 
 
 def keep(name: str, content: bytes) -> None:
-    """Put a file into the folder, whole or not at all.
-
-    Raises
-    ------
-    OutputError
-        If it cannot be kept.
-    """
+    """Put a file into the folder, whole or not at all. Raises OutputError if it cannot be kept."""
     folder = cache_folder()
     if folder is None:
         return

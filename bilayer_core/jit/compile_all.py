@@ -71,17 +71,8 @@ def ensure_compiled(
 def compile_all(report: Callable[[int, int], None] | None = None) -> int:
     """Compile all pieces that the cache lacks and keep them; return how many these are.
 
-    Parameters
-    ----------
-    report : callable, optional
-        Called with the number of pieces compiled so far, and that of all.
-
-    Raises
-    ------
-    OutputError
-        If what is compiled cannot be kept.
-    RuntimeError
-        If one cannot be compiled; the message has what the process printed.
+    `report`: called with the number of pieces compiled so far, and that of all. Raises OutputError if what is compiled
+    cannot be kept. Raises RuntimeError if one cannot be compiled; the message has what the process printed.
     """
     if cache_folder() is None:
         return 0

@@ -32,18 +32,8 @@ def _linker() -> binding.LLJIT:
 def load(name: str, code: bytes, symbols: Mapping[str, int]) -> int:
     """Return the address of a piece.
 
-    Parameters
-    ----------
-    name : str
-    code : bytes
-        Its object file.
-    symbols : mapping of str to int
-        Addresses of what it refers to, beside functions of C and of Python.
-
-    Raises
-    ------
-    RuntimeError
-        If it cannot be linked.
+    `code`: its object file. `symbols`: addresses of what it refers to, beside functions of C and of Python. Raises
+    RuntimeError if it cannot be linked.
     """
     library = binding.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(symbol_of(name))
     helpers = {name: import_module(COMPILER).address_of_helper(name) for name in HELPERS if name.encode() in code}

@@ -17,10 +17,7 @@ OTHERS_ENTER = stat.S_IXGRP | stat.S_IXOTH
 def make_private(folder: Path) -> Path:
     """Make a folder, and those above it that are missing, for this user alone; return its path without links.
 
-    Raises
-    ------
-    OSError
-        If it cannot be made.
+    Raises OSError if it cannot be made.
     """
     for path in (*reversed(folder.parents), folder):
         path.mkdir(mode=0o700, exist_ok=True)

@@ -38,13 +38,7 @@ class Varied:
 
     @classmethod
     def read(cls, text: str) -> Varied:
-        """Read ``NAME=FROM:TO:COUNT``: values evenly from one to another.
-
-        Raises
-        ------
-        InputError
-            If it is none.
-        """
+        """Read ``NAME=FROM:TO:COUNT``: values evenly from one to another. Raises InputError if it is none."""
         name, _, span = text.partition("=")
         parts = span.split(":")
         try:
@@ -61,21 +55,11 @@ class Varied:
 
 @dataclass(frozen=True)
 class Branch:
-    """One of the runs.
+    """One of the runs."""
 
-    Attributes
-    ----------
-    value : float
-        Of what differs.
-    run : RunData
-        From the instant on.
-    stopped : str
-        Why it could not go on to the end; empty if it did.
-    """
-
-    value: float
-    run: RunData
-    stopped: str
+    value: float  # Of what differs
+    run: RunData  # From the instant on
+    stopped: str  # Why it could not go on to the end; empty if it did
 
 
 def run_branches(

@@ -28,29 +28,17 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class LogSize:
-    """Expected size of a log with a state in every frame, the most there can be.
+    """Expected size of a log with a state in every frame, the most there can be."""
 
-    Attributes
-    ----------
-    per_second : float
-        Of simulated time [bytes].
-    total : float
-        For the scene's duration [bytes].
-    """
-
-    per_second: float
-    total: float
+    per_second: float  # Of simulated time [bytes]
+    total: float  # For the scene's duration [bytes]
 
 
 def forecast(simulator: Simulator) -> LogSize:
     """Return the expected size of a log of the scene, as `McapRecorder` writes it.
 
     Contact forces and events are left out: nobody knows how many there will be. Frames within one step share a state.
-
-    Parameters
-    ----------
-    simulator : Simulator
-        At its start.
+    `simulator`: at its start.
     """
     scene, strands = simulator.scene, simulator.description.strands
     encoder = FrameEncoder(simulator.description)

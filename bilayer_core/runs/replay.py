@@ -48,24 +48,12 @@ MOMENT = 1e-9
 
 @dataclass(frozen=True)
 class Difference:
-    """A value that came out otherwise.
+    """A value that came out otherwise."""
 
-    Attributes
-    ----------
-    time : float
-        [s].
-    step : int
-    quantity : str
-        Part of the state, such as ``position``.
-    where : str
-        Node and rod, edge and rod, or body.
-    logged, replayed : float
-    """
-
-    time: float
+    time: float  # [s]
     step: int
-    quantity: str
-    where: str
+    quantity: str  # Part of the state, such as ``position``
+    where: str  # Node and rod, edge and rod, or body
     logged: float
     replayed: float
 
@@ -84,46 +72,23 @@ class Difference:
 
 @dataclass
 class Verification:
-    """Result of making a run again.
-
-    Attributes
-    ----------
-    wholeness : Wholeness
-        Whether the log still holds all states and inputs that were written.
-    states : int
-        That were compared.
-    inputs : int
-        That acted.
-    tolerance : float or None
-        Part of the longest rod by which positions may differ; None: every value is to be equal bit for bit.
-    first, largest : Difference or None
-        The first difference, and the largest of positions.
-    stopped : str
-        Why the run could not be made to the end of the log; empty if it could.
-    changed : dict
-        What differs between the machine and versions of the log and the present ones: name to (then, now).
-    last_time : float
-        Of the last state that was compared [s].
-    derived : int or None
-        Derived messages that were compared; None if that was not asked for.
-    first_derived : str
-        The first of them that differs; empty if none does.
-    not_compared : tuple of str
-        Topics of the log that were not compared.
-    """
+    """Result of making a run again."""
 
     tolerance: float | None
-    wholeness: Wholeness
-    states: int = 0
-    inputs: int = 0
+    """Part of the longest rod by which positions may differ; None: every value is to be equal bit for bit."""
+    wholeness: Wholeness  # Whether the log still holds all states and inputs that were written
+    states: int = 0  # That were compared
+    inputs: int = 0  # That acted
     first: Difference | None = None
     largest: Difference | None = None
-    stopped: str = ""
+    """`first`, `largest`: the first difference, and the largest of positions."""
+    stopped: str = ""  # Why the run could not be made to the end of the log; empty if it could
     changed: dict[str, tuple[str, str]] = field(default_factory=dict)
-    last_time: float = math.nan
-    derived: int | None = None
-    first_derived: str = ""
-    not_compared: tuple[str, ...] = ()
+    """What differs between the machine and versions of the log and the present ones: name to (then, now)."""
+    last_time: float = math.nan  # Of the last state that was compared [s]
+    derived: int | None = None  # Derived messages that were compared; None if that was not asked for
+    first_derived: str = ""  # The first of them that differs; empty if none does
+    not_compared: tuple[str, ...] = ()  # Topics of the log that were not compared
 
     @property
     def equal(self) -> bool:
@@ -207,11 +172,7 @@ def _verified(path: Path, tolerance: float | None, derived: bool) -> Verificatio
 def simulator_of(path: str | Path, overrides: Sequence[str] = ()) -> Simulator:
     """Return a simulator of the scene in a log at the scene's start, with the step settings of the log's run.
 
-    Parameters
-    ----------
-    path : str or Path
-    overrides : sequence of str
-        Changes to the scene, ``KEY=VALUE``; those of ``solver`` come before what the run used.
+    `overrides`: changes to the scene, ``KEY=VALUE``; those of ``solver`` come before what the run used.
     """
     head = read_head(Path(path))
     settings = {key: head.settings.get(key, "") for key in ("model", "dimension", "integrator", "dt", "tolerance")}

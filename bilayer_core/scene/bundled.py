@@ -47,10 +47,7 @@ def _recorded() -> Iterator[Path]:
 def bundled_directory(kind: str) -> Path:
     """Return the directory of the bundled ``scenes``, ``templates`` or ``sweeps``.
 
-    Raises
-    ------
-    SceneError
-        If it is not found; the message lists the places searched.
+    Raises SceneError if it is not found; the message lists the places searched.
     """
     looked = []
     for directory in (candidate / kind for candidate in _candidates()):
@@ -94,10 +91,7 @@ def bundled_sweeps() -> dict[str, Path]:
 def bundled_scene(name: str) -> Path:
     """Return the file of a bundled scene.
 
-    Raises
-    ------
-    SceneError
-        If there is no such scene; suggests the nearest name and lists all.
+    Raises SceneError if there is no such scene; the message suggests the nearest name and lists all.
     """
     return _of_name(name, "scene")
 
@@ -105,10 +99,7 @@ def bundled_scene(name: str) -> Path:
 def bundled_sweep(name: str) -> Path:
     """Return the file of a bundled sweep.
 
-    Raises
-    ------
-    SceneError
-        If there is no such sweep; suggests the nearest name and lists all.
+    Raises SceneError if there is no such sweep; the message suggests the nearest name and lists all.
     """
     return _of_name(name, "sweep")
 

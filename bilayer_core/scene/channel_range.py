@@ -12,15 +12,8 @@ def value_in_range(value: float, minimum: float, maximum: float) -> float | None
 
     A controller computes 1.0000000000000002 or -1e-17 where it means an end of the range.
 
-    Parameters
-    ----------
-    value, minimum, maximum : float
-        In the unit of the channel. Rounding is a difference of up to `ROUNDING` times the width of the range.
-
-    Returns
-    -------
-    float or None
-        None if the value is not finite, or farther outside.
+    `value`, `minimum`, `maximum`: in the unit of the channel. Rounding is a difference of up to `ROUNDING` times the
+    width of the range. Returns None if the value is not finite, or farther outside.
     """
     margin = ROUNDING * (maximum - minimum)
     if math.isfinite(value) and minimum - margin <= value <= maximum + margin:

@@ -56,59 +56,35 @@ NEGLIGIBLE = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class VariedModes:
-    """Modes of a field whose diffusivity depends on it, at Gauss points through its layers.
+    """Modes of a field whose diffusivity depends on it, at Gauss points through its layers."""
 
-    Attributes
-    ----------
-    amplitude : Array
-        γ, shape (n_mode,).
-    value, slope : Array
-        v and ∂v/∂z [1/m], shape (n_point, n_mode).
-    weight : Array
-        S dz of points [m], shape (n_point,).
-    exchange : Array
-        Σ h S v vᵀ of faces, shape (n_mode, n_mode).
-    curve : Array
-        The layer of each point, shape (n_point,).
-    curves : list of tuple of Array
-        Values of the field, and diffusivities there [m²/s], of each layer.
-    """
-
-    amplitude: Array
+    amplitude: Array  # γ, shape (n_mode,)
     value: Array
     slope: Array
-    weight: Array
-    exchange: Array
-    curve: Array
-    curves: list[tuple[Array, Array]]
+    """`value`, `slope`: v and ∂v/∂z [1/m], shape (n_point, n_mode)."""
+    weight: Array  # S dz of points [m], shape (n_point,)
+    exchange: Array  # Σ h S v vᵀ of faces, shape (n_mode, n_mode)
+    curve: Array  # The layer of each point, shape (n_point,)
+    curves: list[tuple[Array, Array]]  # Values of the field, and diffusivities there [m²/s], of each layer
 
 
 @dataclass(frozen=True)
 class Response:
-    """How the eigenstrain of a layer follows a stimulus: by a sum of lags.
+    """How the eigenstrain of a layer follows a stimulus: by a sum of lags."""
 
-    Attributes
-    ----------
-    lags : tuple
-        Time constants of each mode for a rising and a falling stimulus [s].
-    mean, gradient : tuple
-        Weights of modes in the mean of the layer's field, and in its gradient across the layer; the latter is empty
-        where there is none.
-    mean_reference, gradient_reference : float
-        Values of both, in the unit of the stimulus, at which there is no eigenstrain.
-    along : Array or None
-        Multiple of both on each edge of the path, shape (n_edge,); None for 1.
-    varied : VariedModes or None
-        None where no diffusivity depends on the field.
-    """
-
-    lags: tuple[tuple[float, float], ...]
+    lags: tuple[tuple[float, float], ...]  # Time constants of each mode for a rising and a falling stimulus [s]
     mean: tuple[float, ...]
     mean_reference: float
     gradient: tuple[float, ...] = ()
+    """`mean`, `gradient`: weights of modes in the mean of the layer's field, and in its gradient across the layer;
+    the latter is empty where there is none.
+    """
     gradient_reference: float = 0.0
-    along: Array | None = None
-    varied: VariedModes | None = None
+    """`mean_reference`, `gradient_reference`: values of both, in the unit of the stimulus, at which there is no
+    eigenstrain.
+    """
+    along: Array | None = None  # Multiple of both on each edge of the path, shape (n_edge,); None for 1
+    varied: VariedModes | None = None  # None where no diffusivity depends on the field
 
 
 def responses(rod: Rod, layer: Layer, law: Following) -> list[Response]:

@@ -76,14 +76,8 @@ def suggestion(found: object, allowed: Iterable[str]) -> str:
 def tell(error: ValidationError, schema: type[BaseModel], data: Any, source: str) -> str:
     """Return all faults of `error` as lines of text.
 
-    Parameters
-    ----------
-    error : ValidationError
-        What validation of `data` against `schema` raised.
-    data : Any
-        The raw content of the scene, for the names of list items.
-    source : str
-        File, or another origin, to begin each line with.
+    `error`: what validation of `data` against `schema` raised. `data`: the raw content of the scene, for the names of
+    list items. `source`: file, or another origin, to begin each line with.
     """
     faults = error.errors(include_url=False)
     lines = [f"{source}: {_line(fault, schema, data)}" for fault in faults[:MOST_FAULTS]]

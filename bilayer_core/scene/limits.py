@@ -46,10 +46,8 @@ class Rods(Protocol):
 def read_text(path: Path, largest: int) -> str:
     """Return the text of a regular file in UTF-8, with or without a byte order mark.
 
-    Raises
-    ------
-    ValueError
-        With the reason, if there is none: it is missing, a directory, a device or a pipe, too large, or no text.
+    Raises ValueError with the reason, if there is none: it is missing, a directory, a device or a pipe, too large, or
+    no text.
     """
     try:
         status = os.stat(path)

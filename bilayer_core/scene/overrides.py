@@ -20,21 +20,11 @@ Overrides = Sequence[str] | Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Override:
-    """A change of one value of a scene.
+    """A change of one value of a scene."""
 
-    Attributes
-    ----------
-    keys : tuple of str
-        To the value; items of a list are addressed by their name or their index.
-    value : object
-        As YAML has it.
-    text : str
-        What the user gave, for messages.
-    """
-
-    keys: tuple[str, ...]
-    value: Any
-    text: str
+    keys: tuple[str, ...]  # To the value; items of a list are addressed by their name or their index
+    value: Any  # As YAML has it
+    text: str  # What the user gave, for messages
 
     @property
     def origin(self) -> str:
@@ -44,10 +34,7 @@ class Override:
     def find(self, data: dict[str, Any]) -> tuple[Any, Any]:
         """Return the mapping or list that holds the value in a complete scene, and its key or index there.
 
-        Raises
-        ------
-        SceneError
-            If the path does not exist; says what there is instead.
+        Raises SceneError if the path does not exist; the message says what there is instead.
         """
         here: Any = data
         place: Any = None
@@ -61,10 +48,7 @@ class Override:
     def apply(self, data: dict[str, Any]) -> None:
         """Change the value in a complete scene, what its file leaves out included, in place.
 
-        Raises
-        ------
-        SceneError
-            If the path does not exist; says what there is instead.
+        Raises SceneError if the path does not exist; the message says what there is instead.
         """
         holder, place = self.find(data)
         holder[place] = deepcopy(self.value)  # later changes may be of parts of it
@@ -73,12 +57,8 @@ class Override:
 def read_overrides(overrides: Overrides) -> list[Override]:
     """Return the changes that users give as texts or as a mapping of paths to values.
 
-    A text is ``PATH=VALUE`` with a YAML value, such as ``rods.arm.stations=100`` or ``gravity.2=-9.81``.
-
-    Raises
-    ------
-    SceneError
-        If a text is not of this form.
+    A text is ``PATH=VALUE`` with a YAML value, such as ``rods.arm.stations=100`` or ``gravity.2=-9.81``. Raises
+    SceneError if a text is not of this form.
     """
     if isinstance(overrides, Mapping):
         return [_override(str(path), value, f"{path}={value}") for path, value in overrides.items()]

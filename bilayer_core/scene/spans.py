@@ -26,30 +26,16 @@ def value_of_span(t, level, begin, rate, amplitude, frequency, phase):
 
 
 class Span(NamedTuple):
-    """``level + rate s + amplitude sin(frequency s + phase)``, s = t − begin ≥ 0, until a corner or a jump.
+    """``level + rate s + amplitude sin(frequency s + phase)``, s = t − begin ≥ 0, until a corner or a jump."""
 
-    Attributes
-    ----------
-    until : float
-        Time of the next corner or jump [s], infinity if there is none.
-    level : float
-        In the unit of the schedule, as `amplitude`.
-    begin : float
-        Time from which s counts [s].
-    rate : float
-        In that unit per s.
-    amplitude : float
-    frequency, phase : float
-        [rad/s], [rad]
-    """
-
-    until: float
-    level: float
-    begin: float = 0.0
-    rate: float = 0.0
+    until: float  # Time of the next corner or jump [s], infinity if there is none
+    level: float  # In the unit of the schedule, as `amplitude`
+    begin: float = 0.0  # Time from which s counts [s]
+    rate: float = 0.0  # In that unit per s
     amplitude: float = 0.0
     frequency: float = 0.0
     phase: float = 0.0
+    """`frequency`, `phase`: [rad/s], [rad]"""
 
     def value(self, t: float) -> float:
         """Return the value at time `t` [s]; at the end, where the schedule may jump, that from before."""

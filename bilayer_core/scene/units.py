@@ -93,10 +93,7 @@ def parse_quantity(text: str, unit: str) -> float:
 def in_si(value: float, unit: str) -> float:
     """Return a value of a unit in SI units, and one without a unit as it is: 0.055 for 55 mm, π/4 for 45 deg.
 
-    Raises
-    ------
-    ValueError
-        If there is no such unit.
+    Raises ValueError if there is no such unit.
     """
     factor = next((units[unit] for units in USUAL_UNITS.values() if unit in units), None)
     if factor is None:

@@ -118,15 +118,8 @@ class Controls:
     def listen(self, note: Callable[[Input], None]) -> Callable[[], None]:
         """Report all inputs from outside to a listener from now on.
 
-        Parameters
-        ----------
-        note : callable
-            Called with each `observed.inputs.Input`, before the step from which on it acts.
-
-        Returns
-        -------
-        callable
-            Ends the reports.
+        `note`: called with each `observed.inputs.Input`, before the step from which on it acts. Returns a
+        function that ends the reports.
         """
         self.listeners.append(note)
         self._until = math.nan  # who begins to listen hears where steps end

@@ -54,10 +54,7 @@ class Callbacks:
 def time_left(now: float, end_of_scene: float, duration: float | None, until: float | None) -> float:
     """Return the simulated time of a run with the arguments of `Simulator.run` [s].
 
-    Raises
-    ------
-    InputError
-        If both are given, or there is no such time.
+    Raises InputError if both are given, or there is no such time.
     """
     if duration is not None and until is not None:
         raise InputError("run: give a duration or a time `until`, not both")
@@ -291,18 +288,7 @@ class RunLoop:
     def _advance(self, end: float, last: float, inputs: Sequence[Input], callbacks: Callbacks) -> Termination:
         """Make steps until the end of a run, or until someone ends it.
 
-        Parameters
-        ----------
-        end : float
-            Where the last adaptive step ends [s].
-        last : float
-            A step that ends here or later is the last [s].
-        inputs : sequence of Input
-        callbacks : Callbacks
-
-        Returns
-        -------
-        Termination
+        `end`: where the last adaptive step ends [s]. `last`: a step that ends here or later is the last [s].
         """
         waiting = deque(sorted(inputs, key=lambda of: of.time))
         while self._time < last:

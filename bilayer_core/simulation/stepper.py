@@ -252,10 +252,7 @@ class Stepper:
     def make_again(self, state: State, end: float, stood_in: bool) -> None:
         """Make a step to an end [s] by the method, or by what stands in for it, as it was made or would have been.
 
-        Raises
-        ------
-        SimulationError
-            If it cannot be made.
+        Raises SimulationError if it cannot be made.
         """
         begin = float(state.time[0])
         self.surroundings.cover(begin, state.override, state.pose_goal)

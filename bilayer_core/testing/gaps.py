@@ -297,18 +297,7 @@ def _wide_rods(model: Model) -> set[str]:
 class PairsOfEdges:
     """The pairs of edges of a model that may not come together, all of them or, of very many, those that are near.
 
-    Parameters
-    ----------
-    model : Model
-    most : int
-        Number of edges up to which all pairs are listed.
-
-    Attributes
-    ----------
-    count : int
-        Of pairs; of very many edges, of all that there are.
-    has_all : bool
-        Whether all are listed.
+    `most`: number of edges up to which all pairs are listed.
     """
 
     def __init__(self, model: Model, most: int = MOST_EDGES):
@@ -335,8 +324,8 @@ class PairsOfEdges:
         )
         self._all: tuple[Array, Array] | None = None
         self._left_out = np.empty(0, dtype=np.int64)
-        self.count = self._edges * (self._edges - 1) // 2
-        self.has_all = self._edges <= most
+        self.count = self._edges * (self._edges - 1) // 2  # Of pairs; of very many edges, of all that there are
+        self.has_all = self._edges <= most  # Whether all are listed
         if self.has_all:
             self._all = self._allowed(*np.triu_indices(self._edges, 1))
             self.count = len(self._all[0])

@@ -81,13 +81,7 @@ class Judge:
         self._momentum = _Momentum(simulator) if _flies(simulator) else None
 
     def look(self, time: float) -> None:
-        """Look at what a step ended with.
-
-        Raises
-        ------
-        Verdict
-            If it is not as it must be.
-        """
+        """Look at what a step ended with. Raises Verdict if it is not as it must be."""
         self.steps += 1
         if self.steps % self._every:
             return
@@ -128,15 +122,8 @@ class Judge:
     def end(self, inside: bool) -> dict[str, float]:
         """Look at the run as a whole; the figures of it.
 
-        Parameters
-        ----------
-        inside : bool
-            Whether it is in the region of validity.
-
-        Raises
-        ------
-        Verdict
-            If the effort was not bounded, or the budget does not close.
+        `inside`: whether it is in the region of validity. Raises Verdict if the effort was not bounded, or the budget
+        does not close.
         """
         statistics, time = self._simulator.statistics, self._simulator.time
         if self.numerical > MOST_MADE:

@@ -136,15 +136,8 @@ class Sheet:
     def least_gap(self, edges: Array, surface: SceneSurface, place: tuple[Array, Array], unit: float, enough: float):
         """Return the least gap of some stretches to a surface [m], or a number not below `enough` if it is larger.
 
-        Parameters
-        ----------
-        edges : Array
-        surface : SceneSurface
-        place : tuple of Array
-            Position and rotation of the surface.
-        unit : float
-            The barrier distance [m], to a part of which the gap is found.
-        enough : float
+        `place`: position and rotation of the surface. `unit`: the barrier distance [m], to a part of which the gap is
+        found.
         """
         along_way, across_way, bend, turn = self.ways()
         edge, along, across = edges, np.full(len(edges), 0.5), np.zeros(len(edges))

@@ -18,27 +18,13 @@ NOISE = 1e-6
 
 @dataclass(frozen=True)
 class Arrows:
-    """Forces or moments, each with its place.
+    """Forces or moments, each with its place."""
 
-    Attributes
-    ----------
-    times : ndarray
-        [s], shape (n,).
-    origins : ndarray
-        [m], shape (n, m, 3).
-    forces : ndarray
-        [N] or [N m], shape (n, m, 3).
-    metres_per_unit : float
-        Length of an arrow by its size [m/N] or [1/N].
-    shown : float
-        Size from which there is an arrow.
-    """
-
-    times: np.ndarray
-    origins: np.ndarray
-    forces: np.ndarray
-    metres_per_unit: float
-    shown: float
+    times: np.ndarray  # [s], shape (n,)
+    origins: np.ndarray  # [m], shape (n, m, 3)
+    forces: np.ndarray  # [N] or [N m], shape (n, m, 3)
+    metres_per_unit: float  # Length of an arrow by its size [m/N] or [1/N]
+    shown: float  # Size from which there is an arrow
 
 
 def contact_arrows(run: RunData, scales: Scales) -> Arrows:

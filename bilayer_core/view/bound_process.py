@@ -19,12 +19,7 @@ EXIT_LIMIT = 5.0  # longest wait for the program to end before it is killed [s]
 class BoundProcess:
     """A program in a process of its own, which Ctrl-C does not reach.
 
-    Parameters
-    ----------
-    command : sequence of str
-        The program and its arguments.
-    environment : dict
-        Its environment variables.
+    `command`: the program and its arguments. `environment`: its environment variables.
     """
 
     def __init__(self, command: Sequence[str], environment: dict[str, str]):

@@ -41,20 +41,8 @@ class Branch(Protocol):
 def write_branches(branches: Sequence[Branch], name: str, rrd_path: str | Path) -> None:
     """Write runs to one ``.rrd`` file.
 
-    Parameters
-    ----------
-    branches : sequence of Branch
-        At least one.
-    name : str
-        What differs.
-    rrd_path : str or Path
-
-    Raises
-    ------
-    InputError
-        If one holds no frame.
-    OSError
-        If the file cannot be written.
+    `branches`: at least one. `name`: what differs. Raises InputError if one holds no frame. Raises OSError if the file
+    cannot be written.
     """
     widest = max((of.run for of in branches), key=lambda run: float(np.ptp(run.positions, axis=(0, 1)).max()))
     scales, values = choose_scales(widest), np.array([of.value for of in branches])

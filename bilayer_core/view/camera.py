@@ -29,25 +29,17 @@ ALLOWED = (
 
 @dataclass(frozen=True)
 class Camera:
-    """From where a picture is taken.
-
-    Attributes
-    ----------
-    azimuth, elevation : float
-        Of the eye as seen from the robot [rad]; an azimuth of 0 is in front of it, at −y, of 90° at +x.
-    kind : str
-        ``"auto"``, ``"follow"`` or ``"fixed"``.
-    parallel : bool
-        Whether it has no perspective.
-    distance : float or None
-        Of the eye [m]; None as near as all is seen.
-    """
+    """From where a picture is taken."""
 
     azimuth: float
     elevation: float
+    """`azimuth`, `elevation`: of the eye as seen from the robot [rad]; an azimuth of 0 is in front of it, at −y, of
+    90° at +x.
+    """
     kind: str = "fixed"
-    parallel: bool = False
-    distance: float | None = None
+    """``"auto"``, ``"follow"`` or ``"fixed"``."""
+    parallel: bool = False  # Whether it has no perspective
+    distance: float | None = None  # Of the eye [m]; None as near as all is seen
 
     @property
     def axes(self) -> np.ndarray:
@@ -60,23 +52,14 @@ class Camera:
 
 @dataclass(frozen=True)
 class Shot:
-    """Where the eye is in one picture.
-
-    Attributes
-    ----------
-    eye, target, up : ndarray
-        [m], [m], unit, shape (3,).
-    half_height : float or None
-        Of what is seen without perspective [m].
-    metres_per_height : float
-        Height of the picture, in the plane across the line of sight through the target [m].
-    """
+    """Where the eye is in one picture."""
 
     eye: np.ndarray
     target: np.ndarray
     up: np.ndarray
-    half_height: float | None
-    metres_per_height: float
+    """`eye`, `target`, `up`: [m], [m], unit, shape (3,)."""
+    half_height: float | None  # Of what is seen without perspective [m]
+    metres_per_height: float  # Height of the picture, in the plane across the line of sight through the target [m]
 
 
 @dataclass(frozen=True)
@@ -91,10 +74,7 @@ class Insets:
 def parse_camera(text: str) -> Camera:
     """Return the camera that an option names.
 
-    Raises
-    ------
-    InputError
-        If the option names none; the message says what is allowed.
+    Raises InputError if the option names none; the message says what is allowed.
     """
     name = text.strip().lower()
     if name in (AUTO, FOLLOW, "iso"):

@@ -23,30 +23,14 @@ _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, 
 
 @dataclass(frozen=True)
 class Colouring:
-    """How values of rods become colours, the same over a whole run.
+    """How values of rods become colours, the same over a whole run."""
 
-    Attributes
-    ----------
-    quantity : str
-        One of `QUANTITIES`.
-    title : str
-        Of the colour bar, with the unit.
-    limit : float
-        Value of the fullest colour, in SI units.
-    shown_limit : str
-        The same in the unit of the title.
-    diverging : bool
-        Whether colours go from minus the limit to the limit, and not from zero to it.
-    exceeded : bool
-        Whether values beyond the limit occur; they have its colour.
-    """
-
-    quantity: str
-    title: str
-    limit: float
-    shown_limit: str
-    diverging: bool
-    exceeded: bool
+    quantity: str  # One of `QUANTITIES`
+    title: str  # Of the colour bar, with the unit
+    limit: float  # Value of the fullest colour, in SI units
+    shown_limit: str  # The same in the unit of the title
+    diverging: bool  # Whether colours go from minus the limit to the limit, and not from zero to it
+    exceeded: bool  # Whether values beyond the limit occur; they have its colour
 
     @property
     def colour_map(self) -> np.ndarray:

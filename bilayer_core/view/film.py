@@ -21,20 +21,8 @@ ENCODING = "-an -c:v libx264 -pix_fmt yuv420p -preset superfast -crf 21 -movflag
 def save_mp4(pictures: Iterable[Image.Image], size: tuple[int, int], rate: float, path: str | Path) -> int:
     """Write a film and return how many pictures it has.
 
-    Parameters
-    ----------
-    pictures : iterable of Image
-        RGB, each of the same size; taken one by one.
-    size : tuple of int
-        Width and height, both even.
-    rate : float
-        Pictures a second.
-    path : str or Path
-
-    Raises
-    ------
-    OutputError
-        If it cannot be written.
+    `pictures`: RGB, each of the same size; taken one by one. `size`: width and height, both even. `rate`: pictures a
+    second. Raises OutputError if it cannot be written.
     """
     from imageio_ffmpeg import get_ffmpeg_exe
 

@@ -25,30 +25,14 @@ PERIOD = 0.2
 
 @dataclass(frozen=True)
 class Serving:
-    """How what is followed is shown.
+    """How what is followed is shown."""
 
-    Attributes
-    ----------
-    bind : str
-        Address at which viewers are served.
-    port : int or None
-        For viewers; None for the first that is free.
-    window : bool
-        Open the viewer, where there is a screen.
-    web : bool
-        Open a browser instead.
-    save : Path or None
-        Recording that is written as well.
-    colour : str
-        What the colours of rods say.
-    """
-
-    bind: str = "127.0.0.1"
-    port: int | None = None
-    window: bool = True
-    web: bool = False
-    save: Path | None = None
-    colour: str = STRAIN
+    bind: str = "127.0.0.1"  # Address at which viewers are served
+    port: int | None = None  # For viewers; None for the first that is free
+    window: bool = True  # Open the viewer, where there is a screen
+    web: bool = False  # Open a browser instead
+    save: Path | None = None  # Recording that is written as well
+    colour: str = STRAIN  # What the colours of rods say
 
 
 def follow_log(path: str | Path, serving: Serving, say: Callable[[str], None]) -> None:

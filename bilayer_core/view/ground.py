@@ -34,21 +34,11 @@ opacity = {opacity};
 
 @dataclass(frozen=True)
 class Ground:
-    """Where planes are seen.
+    """Where planes are seen."""
 
-    Attributes
-    ----------
-    middle : ndarray
-        The point below which they are in the middle [m], shape (3,).
-    radius : float
-        Where they have faded away [m].
-    cell : float
-        Edge of a square [m]. The squares keep their places when the middle changes.
-    """
-
-    middle: np.ndarray
-    radius: float
-    cell: float
+    middle: np.ndarray  # The point below which they are in the middle [m], shape (3,)
+    radius: float  # Where they have faded away [m]
+    cell: float  # Edge of a square [m]. The squares keep their places when the middle changes.
 
     def corners(self, plane: ShapeInfo) -> np.ndarray:
         """Return the corners of a square that holds the visible part of a plane [m], shape (4, 3)."""
@@ -80,10 +70,7 @@ def below_edge(plane: ShapeInfo, shot: Shot, size: tuple[int, int]) -> list[tupl
 def add_plane(renderer: Any, plane: ShapeInfo, ground: Ground, theme: Theme) -> Any:
     """Draw a plane that fades into the background, or into nothing if that is transparent.
 
-    Returns
-    -------
-    vtkAssembly
-        Whose user matrix may move it.
+    Its user matrix may move it.
     """
     from vtkmodules.vtkRenderingCore import vtkActor, vtkAssembly, vtkPolyDataMapper
 

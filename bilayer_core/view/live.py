@@ -30,15 +30,8 @@ class LiveView:
     """Shows messages as they come, each run as a recording of its own.
 
     Where a limit of colours, or the size of arrows, turns out to be too small, it changes; legend and text change at
-    the same time of the run, so that each moment is shown by what is said of it.
-
-    Parameters
-    ----------
-    server : ViewServer
-    colour : str
-        What the colours of rods say.
-    save : Path, optional
-        File that is written as well; those of later runs are numbered.
+    the same time of the run, so that each moment is shown by what is said of it. `colour`: what the colours of rods
+    say. `save`: file that is written as well; those of later runs are numbered.
     """
 
     def __init__(self, server: ViewServer, colour: str = STRAIN, save: Path | None = None):

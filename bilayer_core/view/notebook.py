@@ -26,29 +26,18 @@ HEIGHT = 480
 
 @dataclass(frozen=True)
 class Shown:
-    """A picture or an animation, which notebooks show.
-
-    Attributes
-    ----------
-    content : bytes
-    kind : str
-        ``png`` or ``webp``.
-    """
+    """A picture or an animation, which notebooks show."""
 
     content: bytes = field(repr=False)
     kind: str
+    """``png`` or ``webp``."""
 
     def _repr_html_(self) -> str:
         """Return it for notebooks."""
         return f"<img style='max-width:100%' src='data:image/{self.kind};base64,{b64encode(self.content).decode()}'>"
 
     def save(self, path: str | Path) -> None:
-        """Write it to a file.
-
-        Parameters
-        ----------
-        path : str or Path
-        """
+        """Write it to a file."""
         if Path(path).suffix.lower() != f".{self.kind}":
             raise InputError(f"{path}: must end in .{self.kind}")
         Path(path).write_bytes(self.content)

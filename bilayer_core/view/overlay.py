@@ -33,12 +33,6 @@ class Overlay:
         What arrows and squares mean: written between the bars, or at the upper left where there is no room.
     text_size : int, optional
         In pixels; by default a share of the height.
-
-    Attributes
-    ----------
-    size : tuple of int
-    aside : list of str
-        Notes at the upper left.
     """
 
     def __init__(
@@ -57,7 +51,7 @@ class Overlay:
         drawing = ImageDraw.Draw(self._legend)
         left = self._draw_colour_bar(drawing, colouring)
         right = self._draw_scale_bar(drawing, metres_per_pixel)
-        self.aside = self._draw_notes(drawing, notes, left, right)
+        self.aside = self._draw_notes(drawing, notes, left, right)  # Notes at the upper left
         self._box = self._legend.getbbox()
         self._legend = self._legend.crop(self._box)
 

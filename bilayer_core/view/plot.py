@@ -87,20 +87,12 @@ class Line:
 
 @dataclass(frozen=True)
 class Axis:
-    """Quantity that curves are drawn over, with the limits and the title of the figure.
+    """Quantity that curves are drawn over, with the limits and the title of the figure."""
 
-    Attributes
-    ----------
-    name : str, optional
-        A quantity, with its component; by default time.
-    across, upwards : tuple of float, optional
-        Limits of both axes, in the units that they show.
-    title : str
-    """
-
-    name: str | None = None
+    name: str | None = None  # A quantity, with its component; by default time
     across: tuple[float, float] | None = None
     upwards: tuple[float, float] | None = None
+    """`across`, `upwards`: limits of both axes, in the units that they show."""
     title: str = ""
 
     def over(self, run: RunData, lines: list[Line], node: int | None) -> list[Line]:

@@ -41,21 +41,11 @@ CHANNEL_COLOURS = (
 
 @dataclass(frozen=True)
 class Plot:
-    """Axes of curves over time.
+    """Axes of curves over time."""
 
-    Attributes
-    ----------
-    path : str
-        Entity of the curves, below ``plots/``.
-    title : str
-        With the unit.
-    curves : int
-        How many there may be.
-    """
-
-    path: str
-    title: str
-    curves: int = 1
+    path: str  # Entity of the curves, below ``plots/``
+    title: str  # With the unit
+    curves: int = 1  # How many there may be
 
 
 def energy_groups(run: RunData, known: Collection[str] = ()) -> dict[str, dict[str, np.ndarray]]:
@@ -99,18 +89,10 @@ def blueprint(run: RunData, scales: Scales, colouring: Colouring) -> rrb.Bluepri
 
 @dataclass(frozen=True)
 class Curves:
-    """Which part of the time plots show: the right part of their axes stays empty, for the legend.
+    """Which part of the time plots show: the right part of their axes stays empty, for the legend."""
 
-    Attributes
-    ----------
-    axis : rerun.TimeRange
-        What axes of time span.
-    shown : rerun.VisibleTimeRange or None
-        Of which times there are curves; all of them if it is None.
-    """
-
-    axis: rr.TimeRange
-    shown: rr.VisibleTimeRange | None = None
+    axis: rr.TimeRange  # What axes of time span
+    shown: rr.VisibleTimeRange | None = None  # Of which times there are curves; all of them if it is None
 
     @classmethod
     def between(cls, begin: float, end: float) -> Curves:

@@ -40,25 +40,13 @@ DEEPEST = 40.0  # radius of the ground, in sizes of the robot: squares of a run 
 
 @dataclass(frozen=True)
 class Look:
-    """How pictures look, as `bilayer render` is asked for it.
-
-    Attributes
-    ----------
-    camera : Camera
-    theme : Theme
-    colour : str
-        One of `colouring.QUANTITIES`.
-    size : tuple of int or None
-        Width and height; None suits what is to be seen.
-    reactions : bool
-        Whether to draw the forces and moments of rods on the bodies that hold them.
-    """
+    """How pictures look, as `bilayer render` is asked for it."""
 
     camera: Camera
     theme: Theme
-    colour: str = STRAIN
-    size: tuple[int, int] | None = None
-    reactions: bool = False
+    colour: str = STRAIN  # One of `colouring.QUANTITIES`
+    size: tuple[int, int] | None = None  # Width and height; None suits what is to be seen
+    reactions: bool = False  # Whether to draw the forces and moments of rods on the bodies that hold them
 
     @classmethod
     def of(cls, camera: str = AUTO, background: str = "dark", **others: object) -> Look:
@@ -174,16 +162,8 @@ class Studio:
     ) -> Iterator[Image.Image]:
         """Return the pictures at `times` [s], with all that is written on them.
 
-        Parameters
-        ----------
-        times : sequence of float
-        insets : Insets
-        rate : float
-            Pictures a second of film; 0 if it is none.
-        texts : list of str
-            What is written on each beside the bars.
-        longest : int, optional
-            The longer side of pictures whose size is not given [pixels].
+        `rate`: pictures a second of film; 0 if it is none. `texts`: what is written on each beside the bars. `longest`:
+        the longer side of pictures whose size is not given [pixels].
         """
         return self._written(self._set(times, insets, rate, longest=longest), texts)
 

@@ -51,12 +51,7 @@ SUMMED = "sum over nodes"
 def write_recording(run: RunData, rrd_path: str | Path, colour: str = STRAIN) -> None:
     """Write `run` to an ``.rrd`` file; InputError if it holds no frame, OSError if the file cannot be written.
 
-    Parameters
-    ----------
-    run : RunData
-    rrd_path : str or Path
-    colour : str
-        What the colours of rods say, from `colouring.QUANTITIES`.
+    `colour`: what the colours of rods say, from `colouring.QUANTITIES`.
     """
     recording = rr.RecordingStream("bilayer_sim")
     memory = recording.memory_recording()  # rerun's own writer ends well where it has lost the end of a file
@@ -79,11 +74,7 @@ def send_run(recording: rr.RecordingStream, run: RunData, colour: str = STRAIN) 
 class RunSender:
     """Sends a run to a recording, as a whole or piece by piece: what never changes goes there once.
 
-    Parameters
-    ----------
-    recording : rerun.RecordingStream
-    description : Description
-        Of the run.
+    `description`: of the run.
     """
 
     def __init__(self, recording: rr.RecordingStream, description: Description):

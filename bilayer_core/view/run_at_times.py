@@ -16,42 +16,25 @@ BESIDE = 1.5
 
 @dataclass(frozen=True)
 class Moment:
-    """A run at one time.
+    """A run at one time."""
 
-    Attributes
-    ----------
-    time : float
-        [s].
-    positions, contact_forces : ndarray
-        Of every node [m, N], shape (node_count, 3).
-    material_frames : ndarray
-        Quaternions at the nodes of strands, shape (strand nodes, 4).
-    values : tuple of ndarray
-        What colours each layer, shape (its nodes,).
-    body_positions, body_quaternions, clamp_wrenches : ndarray
-        [m], x y z w, [N, N m], shapes (bodies, 3 | 4 | 6).
-    """
-
-    time: float
+    time: float  # [s]
     positions: np.ndarray
     contact_forces: np.ndarray
-    material_frames: np.ndarray
-    values: tuple[np.ndarray, ...]
+    """`positions`, `contact_forces`: of every node [m, N], shape (node_count, 3)."""
+    material_frames: np.ndarray  # Quaternions at the nodes of strands, shape (strand nodes, 4)
+    values: tuple[np.ndarray, ...]  # What colours each layer, shape (its nodes,)
     body_positions: np.ndarray
     body_quaternions: np.ndarray
     clamp_wrenches: np.ndarray
+    """`body_positions`, `body_quaternions`, `clamp_wrenches`: [m], x y z w, [N, N m], shapes (bodies, 3 | 4 | 6)."""
 
 
 class Moments:
     """A run that can be looked at between its frames, on straight lines from one to the next.
 
-    Shapes and bodies are recorded at rates of their own; so both are of exactly the time that is asked for.
-
-    Parameters
-    ----------
-    run : RunData
-    values : list of ndarray
-        What colours each of the description's layers, shape (shapes, its nodes).
+    Shapes and bodies are recorded at rates of their own; so both are of exactly the time that is asked for. `values`:
+    what colours each of the description's layers, shape (shapes, its nodes).
     """
 
     def __init__(self, run: RunData, values: list[np.ndarray]):

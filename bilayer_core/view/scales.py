@@ -30,34 +30,17 @@ def rounded_up(value: float) -> float:
 
 @dataclass(frozen=True)
 class Scales:
-    """How quantities become lengths and colours.
+    """How quantities become lengths and colours."""
 
-    Attributes
-    ----------
-    strain_limit : float
-        Strain of the fullest colours.
-    metres_per_newton : float
-        Length of contact arrows.
-    shown_force : float
-        Smallest force that has an arrow [N].
-    size : float
-        Of the robot at the start: the longest edge of its box [m].
-    cell : float
-        Edge of the squares on the ground [m].
-    eye, target : ndarray
-        From where to where a picture looks [m], shape (3,).
-    extent : float
-        Half the diagonal of the box of all that moves [m].
-    """
-
-    strain_limit: float
-    metres_per_newton: float
-    shown_force: float
-    size: float
-    cell: float
+    strain_limit: float  # Strain of the fullest colours
+    metres_per_newton: float  # Length of contact arrows
+    shown_force: float  # Smallest force that has an arrow [N]
+    size: float  # Of the robot at the start: the longest edge of its box [m]
+    cell: float  # Edge of the squares on the ground [m]
     eye: np.ndarray
     target: np.ndarray
-    extent: float
+    """`eye`, `target`: from where to where a picture looks [m], shape (3,)."""
+    extent: float  # Half the diagonal of the box of all that moves [m]
 
 
 def choose_scales(run: RunData) -> Scales:
@@ -105,12 +88,8 @@ def _of_rods(run: RunData) -> np.ndarray:
 def reference_of(forces: np.ndarray) -> float:
     """Return the size by which to scale arrows, 1 if there are no forces.
 
-    It is not the largest one: a few frames of impact would make all other arrows invisible.
-
-    Parameters
-    ----------
-    forces : ndarray
-        [N] or [N m], shape (times, places, 3).
+    It is not the largest one: a few frames of impact would make all other arrows invisible. `forces`: [N] or [N m],
+    shape (times, places, 3).
     """
     largest = np.linalg.norm(forces, axis=2).max(axis=1, initial=0.0)
     largest = largest[largest > 0.0]

@@ -116,19 +116,8 @@ class ViewServer:
 def serve(recording: Path, name: str, say: Callable[[str], None]) -> NoReturn:
     """Show a recording in a browser, until a signal comes.
 
-    Parameters
-    ----------
-    recording : Path
-        Absolute.
-    name : str
-        What the user calls it.
-    say : callable
-        Takes the line for the screen, with the address.
-
-    Raises
-    ------
-    OutputError
-        If the server ends.
+    `recording`: an absolute path. `name`: what the user calls it. `say`: takes the line for the screen, with the
+    address. Raises OutputError if the server ends.
     """
     with ViewServer(recording=recording) as server:
         say(f"{name}: {server.web_address} (served to this machine only, until Ctrl-C)")

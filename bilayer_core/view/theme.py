@@ -18,35 +18,21 @@ Colour = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class Theme:
-    """Colours of a picture.
+    """Colours of a picture."""
 
-    Attributes
-    ----------
-    background : tuple of int
-        Red, green and blue; what a transparent one is drawn for.
-    transparent : bool
-    text, halo : tuple of int
-        Of what is written, and of its outline.
-    ground : tuple of two colours
-        Squares of planes.
-    """
-
-    background: Colour
+    background: Colour  # Red, green and blue; what a transparent one is drawn for
     transparent: bool
     text: Colour
     halo: Colour
-    ground: tuple[Colour, Colour]
+    """`text`, `halo`: of what is written, and of its outline."""
+    ground: tuple[Colour, Colour]  # Squares of planes
 
 
 def theme_of(background: str) -> Theme:
     """Return the theme of a background.
 
-    A background is ``dark``, ``white``, ``transparent``, or a colour that Pillow knows (``#f4f1e8``).
-
-    Raises
-    ------
-    InputError
-        If it is none of these.
+    A background is ``dark``, ``white``, ``transparent``, or a colour that Pillow knows (``#f4f1e8``). Raises InputError
+    if it is none of these.
     """
     from PIL import ImageColor
 

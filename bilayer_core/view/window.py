@@ -61,23 +61,8 @@ def _offscreen() -> Any:
 class Window:
     """Draws what is added to its renderer.
 
-    Parameters
-    ----------
-    theme : Theme
-        Of the background.
-    size : tuple of int
-        Width and height of whole pictures.
-    clear : bool
-        Whether pictures have no background, to be laid over others.
-
-    Attributes
-    ----------
-    renderer : vtkRenderer
-
-    Raises
-    ------
-    InputError
-        If VTK or a driver is missing.
+    `theme`: of the background. `size`: width and height of whole pictures. `clear`: whether pictures have no
+    background, to be laid over others. Raises InputError if VTK or a driver is missing.
     """
 
     def __init__(self, theme: Theme, size: tuple[int, int], clear: bool):
@@ -102,18 +87,8 @@ class Window:
     def draw(self, shot: Shot, part: Part, finer: int) -> np.ndarray:
         """Draw a part of the picture.
 
-        Parameters
-        ----------
-        shot : Shot
-            Of the whole picture.
-        part : tuple of int
-        finer : int
-            How many times as many pixels are drawn along each side.
-
-        Returns
-        -------
-        ndarray
-            RGBA, colours times opacity, as bytes from the upper row on; shape (finer x rows, finer x columns, 4).
+        `shot`: of the whole picture. `finer`: how many times as many pixels are drawn along each side. Returns RGBA,
+        colours times opacity, as bytes from the upper row on; shape (finer x rows, finer x columns, 4).
         """
         left, upper, right, lower = part
         self._window.SetSize(finer * (right - left), finer * (lower - upper))
@@ -160,10 +135,7 @@ class Window:
 def outlined(drawn: np.ndarray) -> np.ndarray:
     """Return what is drawn with a darker edge, so that pale strips are seen on pale ground.
 
-    Parameters
-    ----------
-    drawn : ndarray
-        RGBA, colours times opacity, with `FINER` times as many pixels along each side.
+    `drawn`: RGBA, colours times opacity, with `FINER` times as many pixels along each side.
     """
     seen = drawn[..., 3] > 0
     within = seen[: -2 * FINER, FINER:-FINER] & seen[2 * FINER :, FINER:-FINER]
@@ -178,13 +150,8 @@ def outlined(drawn: np.ndarray) -> np.ndarray:
 def lay_over(picture: np.ndarray, drawn: np.ndarray, part: Part) -> None:
     """Draw what has twice as many pixels along each side over a part of a picture, smaller by as much.
 
-    Parameters
-    ----------
-    picture : ndarray
-        RGBA, colours times opacity, as bytes, shape (rows, columns, 4); changed.
-    drawn : ndarray
-        The same, shape (2 x rows of the part, 2 x its columns, 4).
-    part : tuple of int
+    `picture`: RGBA, colours times opacity, as bytes, shape (rows, columns, 4); changed. `drawn`: the same, shape (2 x
+    rows of the part, 2 x its columns, 4).
     """
     left, upper, _, _ = part
     pairs = drawn.reshape(len(drawn), -1).view(np.uint64)  # of pixels beside each other
@@ -229,18 +196,8 @@ def part_around(shot: Shot, points: np.ndarray, size: tuple[int, int], least: tu
 
     It is the whole picture if a point is beside the eye or behind it.
 
-    Parameters
-    ----------
-    shot : Shot
-    points : ndarray
-        [m], shape (points, 3).
-    size, least : tuple of int
-        Width and height of the picture, and least ones of the part.
-
-    Returns
-    -------
-    tuple of int or None
-        None if none of the points is seen.
+    `points`: [m], shape (points, 3). `size`, `least`: width and height of the picture, and least ones of the part.
+    Returns None if none of the points is seen.
     """
     places = pixels_of(shot, points, size)
     if not len(places) or np.isnan(places).any():

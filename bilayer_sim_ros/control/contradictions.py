@@ -51,15 +51,8 @@ class Contradictions:
     One controller that follows another is none, and neither are two that send the same: a second one contradicts if it
     speaks between two messages of the first, within a control period or a second, and its value is not between theirs.
 
-    Parameters
-    ----------
-    channels : sequence of Channel
-    ticks : callable
-        Returns how many control periods have begun.
-    tell : callable
-        Called once for each channel, with its name and the value of each of the two sources.
-    clock : callable
-        Steady clock [s].
+    `ticks`: returns how many control periods have begun. `tell`: called once for each channel, with its name and the
+    value of each of the two sources. `clock`: steady clock [s].
     """
 
     def __init__(

@@ -135,19 +135,8 @@ class Control:
 def tick_rate(control_period: float, rate: float, shortest: float) -> float:
     """Return the ticks per simulated second [Hz].
 
-    Parameters
-    ----------
-    control_period : float
-        Wished distance of ticks [s]; 0 = that of frames.
-    rate : float
-        Of frames [Hz].
-    shortest : float
-        Least distance of ticks [s].
-
-    Raises
-    ------
-    InputError
-        If ticks are closer together than steps.
+    `control_period`: wished distance of ticks [s]; 0 = that of frames. `rate`: of frames [Hz]. `shortest`: least
+    distance of ticks [s]. Raises InputError if ticks are closer together than steps.
     """
     if control_period == 0.0:
         return rate

@@ -19,13 +19,8 @@ class Lockstep:
     At every tick the time is published, and the step from there waits for messages that come after that. A controller
     that answers each distinct time once thus acts at the same simulated times however long it takes.
 
-    Parameters
-    ----------
-    inputs : StimulusInputs
-    publish : callable
-        Publishes a time [s].
-    timeout : float
-        Longest wait for the answers to a tick [s of real time]; 0 = as long as it takes.
+    `publish`: publishes a time [s]. `timeout`: longest wait for the answers to a tick [s of real time]; 0 = as long as
+    it takes.
     """
 
     def __init__(self, inputs: StimulusInputs, publish: Callable[[float], None], timeout: float = 0.0):

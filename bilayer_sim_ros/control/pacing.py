@@ -15,22 +15,12 @@ OTHERS = "other threads and programs"
 class Pacer:
     """Says how long to wait so that simulated time does not run ahead of `factor` times real time.
 
-    Parameters
-    ----------
-    factor : float
-        Simulated seconds per second; 0 means without waiting.
-    clock : callable
-        Steady clock [s].
-
-    Attributes
-    ----------
-    lost : float
-        Lag that was not made up for, in all [s].
+    `factor`: simulated seconds per second; 0 means without waiting. `clock`: steady clock [s].
     """
 
     def __init__(self, factor: float, clock: Callable[[], float] = time.monotonic):
         self.factor = factor
-        self.lost = 0.0
+        self.lost = 0.0  # Lag that was not made up for, in all [s]
         self._clock = clock
         self.restart(0.0)
 

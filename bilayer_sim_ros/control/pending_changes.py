@@ -27,22 +27,14 @@ class Ramp(TypedDict, total=False):
 class Commands:
     """Collects what messages ask for (any thread) until a tick begins (the stepping thread).
 
-    Parameters
-    ----------
-    refuse : callable
-        Called with the reason when something cannot be done, in the stepping thread.
-
-    Attributes
-    ----------
-    forgotten : callable
-        Called by `reset`, in the stepping thread.
+    `refuse`: called with the reason when something cannot be done, in the stepping thread.
     """
 
     def __init__(self, refuse: Callable[[str], None]):
         self._refuse = refuse
         self._lock = threading.Lock()
         self._waiting: dict[tuple[str, str], Callable[[Simulator, Ramp], None]] = {}
-        self.forgotten: Callable[[], None] = lambda: None
+        self.forgotten: Callable[[], None] = lambda: None  # Called by `reset`, in the stepping thread
         self._first: dict[tuple[str, str], Callable[[Simulator, Ramp], None]] = {}
         self._begun = False
 
@@ -73,10 +65,7 @@ class Commands:
     def apply(self, simulator: Simulator, ramp: Ramp) -> bool:
         """Let what waits act from now on, loads by a ramp; poses have limits of their own.
 
-        Returns
-        -------
-        bool
-            Whether anything did.
+        Returns whether anything did.
         """
         if self._begun and not self._waiting:
             return False

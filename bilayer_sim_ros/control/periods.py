@@ -11,10 +11,7 @@ ROUNDING = 1e-6
 class Periods:
     """Periods of a run that follow one another from its start.
 
-    Parameters
-    ----------
-    rate : float
-        Periods per simulated second [Hz]; may be set at any time, and counts from the start then too.
+    `rate`: periods per simulated second [Hz]; may be set at any time, and counts from the start then too.
     """
 
     def __init__(self, rate: float):

@@ -137,15 +137,8 @@ class StimulusInputs:
     def receive_stamped(self, tick: int, names: Sequence[str], values: Sequence[float]) -> str:
         """Take values of channels as an answer to a tick [ns].
 
-        Returns
-        -------
-        str
-            Why it is ignored (see `Answers.take`); empty if it counts, as it always does outside lockstep.
-
-        Raises
-        ------
-        InputError
-            If names and values are not one each, or one of them is refused; all last good values stay in force.
+        Returns why it is ignored (see `Answers.take`); empty if it counts, as it always does outside lockstep. Raises
+        InputError if names and values are not one each, or one of them is refused; all last good values stay in force.
         """
         if not names or len(names) != len(values) or len(set(names)) != len(names):
             few = shortened(", ".join(map(shortened, names[:FEW_NAMES])) + (", ..." if len(names) > FEW_NAMES else ""))
@@ -163,19 +156,8 @@ class StimulusInputs:
     def answer(self, name: str, tick: int | None, take: Callable[[], None]) -> str:
         """Take something else than a stimulus, and where ticks wait for it, as an answer to one.
 
-        Parameters
-        ----------
-        name : str
-            As in `Answers`.
-        tick : int or None
-            The one that it answers [ns]; None for the open one.
-        take : callable
-            Called if it counts; `changes`, which comes first at a tick, waits until it has been.
-
-        Returns
-        -------
-        str
-            As from `receive_stamped`.
+        `name`: as in `Answers`. `tick`: the one that it answers [ns]; None for the open one. `take`: called if it
+        counts; `changes`, which comes first at a tick, waits until it has been. Returns what `receive_stamped` does.
         """
         if self._answers is None or not self._answers.waits_for(name):
             take()

@@ -44,12 +44,8 @@ class Rest:
     To look for messages costs the executor 0.3 to 1 ms whatever comes, so that a controller of 1 kHz would take half of
     a processor from the physics.
 
-    Parameters
-    ----------
-    rate : float
-        Ticks per simulated second [Hz]: the rest takes a quarter of their period, and at most `LONGEST_REST`.
-    factor : callable
-        Simulated seconds per second at the present; 0 means as many as can be, and no rest.
+    `rate`: ticks per simulated second [Hz]: the rest takes a quarter of their period, and at most `LONGEST_REST`.
+    `factor`: simulated seconds per second at the present; 0 means as many as can be, and no rest.
     """
 
     def __init__(self, rate: float, factor: Callable[[], float]):

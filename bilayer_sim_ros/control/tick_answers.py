@@ -62,16 +62,8 @@ class Answers:
     def take(self, channels: Collection[str], stamp: int | None) -> str:
         """Note an answer of some channels.
 
-        Parameters
-        ----------
-        channels : collection of str
-        stamp : int or None
-            The tick that it answers [ns]; without one it answers the open tick.
-
-        Returns
-        -------
-        str
-            Why it is ignored: `LATE`, `DUPLICATE` or `FOREIGN`; empty if it counts.
+        `stamp`: the tick that it answers [ns]; without one it answers the open tick. Returns why it is ignored: `LATE`,
+        `DUPLICATE` or `FOREIGN`; empty if it counts.
         """
         fault = "" if stamp is None else self._fault(channels, stamp)
         if fault:

@@ -40,13 +40,7 @@ def while_valid(node: Node, publish: Callable[Arguments, None]) -> Callable[Argu
 
 
 class WhileValid:
-    """A publisher of frames to whom the same applies; see `worker.Publisher`.
-
-    Parameters
-    ----------
-    node : Node
-    publisher : FramePublisher
-    """
+    """A publisher of frames to whom the same applies; see `worker.Publisher`."""
 
     def __init__(self, node: Node, publisher: Any):
         self._node, self._publisher = node, publisher

@@ -33,11 +33,6 @@ class ConfiguredNode(Node):
     **of_node
         As for `rclpy.node.Node`.
 
-    Attributes
-    ----------
-    values : dict
-        Value of each parameter at the start, by its name.
-
     Raises
     ------
     InputError
@@ -66,7 +61,7 @@ class ConfiguredNode(Node):
         in_code = {parameter.name for parameter in of_node.get("parameter_overrides") or ()}
         try:
             overrides = overrides_of(self, table, sources, in_code)
-            self.values = declare(self, table, overrides, given)
+            self.values = declare(self, table, overrides, given)  # Value of each parameter at the start, by its name
         except InputError:
             self.destroy_node()
             raise

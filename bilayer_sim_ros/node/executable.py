@@ -44,11 +44,8 @@ def run(
     on the main thread, beside an executor that serves the node's topics and services; it returns when it is done, or
     soon after `stop` is set. The parameter that is called `argument` may be given without its name.
 
-    Returns
-    -------
-    int
-        0 done, also after SIGINT or SIGTERM, which are how nodes end; 2 bad input; 3 the simulation could not go on, or
-        its log is not whole.
+    Returns 0 when done, also after SIGINT or SIGTERM, which are how nodes end; 2 bad input; 3 the simulation could not
+    go on, or its log is not whole.
     """
     stop = signals.take()
     argv = sys.argv if argv is None else [executable, *argv]

@@ -23,13 +23,7 @@ MOST_WARNINGS = 100
 
 
 class GraphWatch:
-    """Warns, once for each topic, while the node's executor spins.
-
-    Parameters
-    ----------
-    node : Node
-        With all its topics.
-    """
+    """Warns, once for each topic, while the node's executor spins. `node`: with all its topics."""
 
     def __init__(self, node: Node):
         self._node = node

@@ -37,16 +37,7 @@ def describe(parameter: NodeParameter) -> str:
 def parameters_of(table: Iterable[NodeParameter], given: Mapping[str, str]) -> dict[str, Value]:
     """Return the values of parameters whose arguments are not empty.
 
-    Parameters
-    ----------
-    table : iterable of NodeParameter
-    given : mapping
-        Text of each argument.
-
-    Raises
-    ------
-    InputError
-        For a text that says no value of the parameter's type.
+    `given`: text of each argument. Raises InputError for a text that says no value of the parameter's type.
     """
     texts = [
         (name, parameter, given.get(argument, "")) for parameter in table for argument, name in arguments_of(parameter)

@@ -27,13 +27,7 @@ PACKAGE = "bilayer_sim_ros"
 def node_description(executable: str, node_name: str, table: Sequence[NodeParameter]) -> LaunchDescription:
     """Return a description of one node of this package; arguments override what its file of parameters says.
 
-    Parameters
-    ----------
-    executable : str
-    node_name : str
-        By default.
-    table : sequence of NodeParameter
-        Its parameters.
+    `node_name`: the default name. `table`: its parameters.
     """
     defaults = dict.fromkeys(NODE_ARGUMENTS, "") | {"name": node_name}
     arguments = {

@@ -34,13 +34,8 @@ def friction_overrides(scene: SceneConfig, parameters: Mapping[str, Value]) -> l
 class LiveFriction:
     """Has coefficients change at the next tick, and tells so when they do.
 
-    Parameters
-    ----------
-    simulator : Simulator
-    commands : Commands
-        Where changes wait for a tick; they are forgotten with the other commands in a reset.
-    tell : callable
-        Publishes and logs an event; called in the stepping thread.
+    `commands`: where changes wait for a tick; they are forgotten with the other commands in a reset. `tell`: publishes
+    and logs an event; called in the stepping thread.
     """
 
     def __init__(self, simulator: Simulator, commands: Commands, tell: Callable[[Event], None]):

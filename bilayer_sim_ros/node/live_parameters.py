@@ -16,13 +16,8 @@ from bilayer_sim_ros.node.parameters import NodeParameter, Value
 class LiveParameters:
     """Has what a parameter is set to done, and refuses with the reason what cannot be done.
 
-    Parameters
-    ----------
-    node : Node
-    table : sequence of NodeParameter
-    changes : mapping
-        Name of a live parameter -> what asks for a new value, and returns the future of what came of it, which must
-        not need the node's executor.
+    `changes`: name of a live parameter -> what asks for a new value, and returns the future of what came of it, which
+    must not need the node's executor.
     """
 
     def __init__(self, node: Node, table: Sequence[NodeParameter], changes: Mapping[str, Callable[[Value], Future]]):

@@ -29,10 +29,7 @@ def message_class(ros_type: str) -> type:
 def installed_message_class(ros_type: str) -> type:
     """Return the class of a message type that a file names, of an installed package of ROS messages alone.
 
-    Raises
-    ------
-    InputError
-        If it is no name of a type, or no installed package has such a message. Nothing was imported then.
+    Raises InputError if it is no name of a type, or no installed package has such a message. Nothing was imported then.
     """
     match = _TYPE.fullmatch(ros_type)
     if match is None:

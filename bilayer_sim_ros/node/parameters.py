@@ -21,34 +21,18 @@ OFF = "off"
 
 @dataclass(frozen=True)
 class NodeParameter:
-    """One parameter of a node; the type of `default` is that of the parameter.
-
-    Attributes
-    ----------
-    name, description : str
-        The description states the unit.
-    default : bool, float, str or list of str
-        A list is ``[""]`` for none: the parameter files of ROS have no empty lists.
-    minimum : float
-        Smallest value of a number; a default below it is allowed too.
-    above_minimum : bool
-        Whether `minimum` itself is excluded.
-    choices : tuple of str
-        All values of a text parameter; empty when any text will do.
-    live : bool
-        Whether it may be set while the node runs; others are read once, at the start.
-    formerly : str
-        A name that it had, by which it may still be given at the start.
-    """
+    """One parameter of a node; the type of `default` is that of the parameter."""
 
     name: str
     default: bool | float | str | list[str]
+    """A list is ``[""]`` for none: the parameter files of ROS have no empty lists."""
     description: str
-    minimum: float = -math.inf
-    above_minimum: bool = False
-    choices: tuple[str, ...] = ()
-    live: bool = False
-    formerly: str = ""
+    """`name`, `description`: the description states the unit."""
+    minimum: float = -math.inf  # Smallest value of a number; a default below it is allowed too
+    above_minimum: bool = False  # Whether `minimum` itself is excluded
+    choices: tuple[str, ...] = ()  # All values of a text parameter; empty when any text will do
+    live: bool = False  # Whether it may be set while the node runs; others are read once, at the start
+    formerly: str = ""  # A name that it had, by which it may still be given at the start
 
     @property
     def allowed(self) -> str:
@@ -92,10 +76,7 @@ class NodeParameter:
 def accept_all(table: Iterable[NodeParameter], overrides: Mapping[str, object]) -> dict[str, Value]:
     """Return the values of all parameters in `table`: the default, or what `overrides` says.
 
-    Raises
-    ------
-    InputError
-        For a name that is not in the table, or a value that is not allowed.
+    Raises InputError for a name that is not in the table, or a value that is not allowed.
     """
     known = {parameter.name: parameter for parameter in table}
     for name in overrides:

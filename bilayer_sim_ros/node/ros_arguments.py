@@ -24,22 +24,13 @@ ALL_NODES = "/**"
 
 @dataclass(frozen=True)
 class Given:
-    """One value of a parameter, as it was given.
-
-    Attributes
-    ----------
-    section : str
-        Full name of the node that it is for, possibly with ``*`` for one word and ``**`` for any number of words.
-    name : str
-    value : object
-    file : str
-        Parameter file; empty for the command line.
-    """
+    """One value of a parameter, as it was given."""
 
     section: str
+    """Full name of the node that it is for, possibly with ``*`` for one word and ``**`` for any number of words."""
     name: str
     value: Any
-    file: str = ""
+    file: str = ""  # Parameter file; empty for the command line
 
     def is_for(self, node: str) -> bool:
         """Return whether it is for the node of that full name."""

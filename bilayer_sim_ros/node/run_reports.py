@@ -32,15 +32,8 @@ WARNING_PERIOD = 10.0
 class Announcer:
     """Says how a run is doing; called in the thread that simulates.
 
-    Parameters
-    ----------
-    node : Node
-    inputs : StimulusInputs
-        Whose late and missing messages are said too.
-    parameters : mapping
-        Of the node.
-    tell : callable
-        Publishes and logs an event.
+    `inputs`: whose late and missing messages are said too. `parameters`: of the node. `tell`: publishes and logs an
+    event.
     """
 
     def __init__(

@@ -21,66 +21,36 @@ STATUS_PERIOD = 1.0
 class Status:
     """How the run is doing: since the status before, except for `time`, `paused`, `asked_factor`, `rejected_in_all`,
     `numerical_energy`, `waited` and `log`.
-
-    Attributes
-    ----------
-    time : float
-        Simulated time [s].
-    paused : bool
-    real_time_factor : float
-        Simulated seconds per second.
-    asked_factor : float
-        The same as it was asked for; 0 for as fast as possible.
-    lost : float
-        Lag behind it that is not made up for [s].
-    real : float
-        Real time [s].
-    spent : dict
-        What that went to, in part: cause (`pacing`) to seconds.
-    steps, substeps, rejected, iterations : int
-        Steps, the parts in which they were taken, attempts that were not accepted, and Newton iterations.
-    rejected_in_all : int
-        Such attempts since the start.
-    residual : float
-        Largest of the last velocity corrections of steps [m/s].
-    numerical_energy, energy_through : float
-        What steps have made or, below zero, lost of energy since the start, and the largest energy of the run [J].
-    waited : float
-        Real time for which there has been no step because no controller answers [s].
-    log : LogStatus
-    dropped : int
-        Frames left out of the log.
     """
 
-    time: float
+    time: float  # Simulated time [s]
     paused: bool
-    real_time_factor: float = 0.0
-    asked_factor: float = 0.0
-    lost: float = 0.0
-    real: float = 0.0
-    spent: dict[str, float] = field(default_factory=dict)
+    real_time_factor: float = 0.0  # Simulated seconds per second
+    asked_factor: float = 0.0  # The same as it was asked for; 0 for as fast as possible
+    lost: float = 0.0  # Lag behind it that is not made up for [s]
+    real: float = 0.0  # Real time [s]
+    spent: dict[str, float] = field(default_factory=dict)  # What that went to, in part: cause (`pacing`) to seconds
     steps: int = 0
     substeps: int = 0
     rejected: int = 0
     iterations: int = 0
-    residual: float = 0.0
-    rejected_in_all: int = 0
+    """`steps`, `substeps`, `rejected`, `iterations`: steps, the parts in which they were taken, attempts that were
+    not accepted, and Newton iterations.
+    """
+    residual: float = 0.0  # Largest of the last velocity corrections of steps [m/s]
+    rejected_in_all: int = 0  # Such attempts since the start
     numerical_energy: float = 0.0
     energy_through: float = 0.0
-    waited: float = 0.0
+    """`numerical_energy`, `energy_through`: what steps have made or, below zero, lost of energy since the start, and
+    the largest energy of the run [J].
+    """
+    waited: float = 0.0  # Real time for which there has been no step because no controller answers [s]
     log: LogStatus = LogStatus()
-    dropped: int = 0
+    dropped: int = 0  # Frames left out of the log
 
 
 class StatusReporter:
-    """Sums up steps and reports them.
-
-    Parameters
-    ----------
-    report : callable
-        Called with a `Status`.
-    pacer : Pacer
-    """
+    """Sums up steps and reports them. `report`: called with a `Status`."""
 
     def __init__(self, report: Callable[[Status], None], pacer: Pacer):
         self._report = report

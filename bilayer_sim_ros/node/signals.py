@@ -68,10 +68,7 @@ class Stop:
 class Signals:
     """The handlers of a process that is one node. Until `take` is called a signal ends the process at once.
 
-    Parameters
-    ----------
-    executable : str
-        Begins what is said then.
+    `executable`: the name with which its messages begin.
     """
 
     def __init__(self, executable: str):

@@ -38,11 +38,6 @@ class SimulationRun:
     ended : callable
         Called at the very end, in a thread of the run.
 
-    Attributes
-    ----------
-    error : Exception or None
-        Why it ended, unless it was stopped or reached its duration.
-
     Raises
     ------
     InputError
@@ -50,7 +45,7 @@ class SimulationRun:
     """
 
     def __init__(self, node: Node, parameters: Mapping[str, Value], ended: Callable[[], None]):
-        self.error: Exception | None = None
+        self.error: Exception | None = None  # Why it ended, unless it was stopped or reached its duration
         self._logger = node.get_logger()
         self._ended = ended
         self._stop, self._over = threading.Event(), threading.Event()

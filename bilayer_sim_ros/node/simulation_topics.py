@@ -45,28 +45,15 @@ UNPACED_PATIENCE = 0.25
 
 @dataclass(frozen=True)
 class Simulation:
-    """A simulation with all its topics and services; what is asked for and sent before it runs waits.
+    """A simulation with all its topics and services; what is asked for and sent before it runs waits."""
 
-    Attributes
-    ----------
-    simulator : Simulator
-        At its start, not compiled.
-    worker : SimulationWorker
-        Not started.
-    frames : WhileValid
-        Where its frames are published.
-    services : Services
-    announcer : Announcer
-    state : str
-        ``paused`` or ``running``, as it starts.
-    """
-
-    simulator: Simulator
-    worker: SimulationWorker
-    frames: WhileValid
+    simulator: Simulator  # At its start, not compiled
+    worker: SimulationWorker  # Not started
+    frames: WhileValid  # Where its frames are published
     services: Services
     announcer: Announcer
     state: str
+    """``paused`` or ``running``, as it starts."""
 
 
 def wire(

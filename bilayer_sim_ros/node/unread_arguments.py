@@ -28,12 +28,7 @@ MOST_SECTIONS = 5
 def refuse_bare_parameters(argv: Sequence[str], names: Collection[str]) -> None:
     """Raise InputError for a word such as ``scene:=x`` without ``-p``, which ROS takes for a remapping of a topic.
 
-    Parameters
-    ----------
-    argv : sequence of str
-        The command line.
-    names : collection of str
-        Of all parameters.
+    `argv`: the command line. `names`: of all parameters.
     """
     before = ""
     for word in argv[1:]:
@@ -48,14 +43,7 @@ def refuse_bare_parameters(argv: Sequence[str], names: Collection[str]) -> None:
 def unread_arguments(argv: Sequence[str], node: str, names: Collection[str]) -> Iterator[str]:
     """Yield what to say of parameters for other nodes than the only one of a process.
 
-    Parameters
-    ----------
-    argv : sequence of str
-        The command line.
-    node : str
-        Full name of the node.
-    names : collection of str
-        Of all its parameters.
+    `argv`: the command line. `node`: full name of the node. `names`: of all its parameters.
     """
     for flag, text in ros_options(argv):
         if flag == FILE_FLAG:

@@ -47,13 +47,7 @@ def status_without_run(message: str, name: str) -> DiagnosticArray:
 def to_diagnostics(status: Status, name: str, ignored: Mapping[str, int]) -> DiagnosticArray:
     """Return how the run is doing.
 
-    Parameters
-    ----------
-    status : Status
-    name : str
-        Full name of the node.
-    ignored : mapping
-        How many answers to ticks are ignored so far, by the reason.
+    `name`: full name of the node. `ignored`: how many answers to ticks are ignored so far, by the reason.
     """
     waiting = status.waited > 0.0
     late = not (status.paused or waiting) and status.real_time_factor < ON_TIME * status.asked_factor

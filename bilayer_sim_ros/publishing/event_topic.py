@@ -17,13 +17,7 @@ DEPTH = 100
 
 
 class EventPublisher:
-    """Publishes events as ready-made bytes while somebody subscribes to them.
-
-    Parameters
-    ----------
-    node : Node
-    description : Description
-    """
+    """Publishes events as ready-made bytes while somebody subscribes to them."""
 
     def __init__(self, node: Node, description: Description):
         quality = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE)

@@ -41,13 +41,7 @@ LOSSY = QoSProfile(depth=LIVE.depth, reliability=ReliabilityPolicy.BEST_EFFORT, 
 class LivePublisher:
     """Publishes ``~/description`` once, and ``~/live`` while somebody subscribes to it.
 
-    Parameters
-    ----------
-    node : Node
-    description : Description
-    encoder : FrameEncoder
-    rate, marker_rate : float
-        Of frames, and of shapes of rods [Hz]; fewer come where simulated time is fast.
+    `rate`, `marker_rate`: of frames, and of shapes of rods [Hz]; fewer come where simulated time is fast.
     """
 
     def __init__(self, node: Node, description: Description, encoder: FrameEncoder, rate: float, marker_rate: float):

@@ -52,10 +52,7 @@ class Nobody:
 def live_view(node: Node, parameters: Mapping[str, Value]) -> Viewers:
     """Return the live view that the parameters select.
 
-    Raises
-    ------
-    InputError
-        If rerun is not installed, or the port is not valid.
+    Raises InputError if rerun is not installed, or the port is not valid.
     """
     if parameters["rerun"] != SERVE:
         return Nobody()
@@ -69,15 +66,8 @@ def live_view(node: Node, parameters: Mapping[str, Value]) -> Viewers:
 class LiveView:
     """A follower of the node as a process of its own.
 
-    It is served at a lower priority than the simulation, hears of frames by a lossy topic, and ends when the node
-    does, however that ends. If it ends before, the node says so once and goes on.
-
-    Parameters
-    ----------
-    node : Node
-    bind : str
-    port : int
-        0 for the first free one.
+    It is served at a lower priority than the simulation, hears of frames by a lossy topic, and ends when the node does,
+    however that ends. If it ends before, the node says so once and goes on. `port`: 0 for the first free one.
     """
 
     def __init__(self, node: Node, bind: str, port: int):
@@ -101,10 +91,7 @@ class LiveView:
     def wait(self, stop: threading.Event, seen: Callable[[], bool]) -> None:
         """Return once the first frame would be `seen`, or nobody is there to see it.
 
-        Raises
-        ------
-        InputError
-            If it cannot be served where it was asked for.
+        Raises InputError if it cannot be served where it was asked for.
         """
         deadline = time.monotonic() + START_LIMIT
         while not (self._ready.is_set() and seen()) and not stop.wait(_LOOK):

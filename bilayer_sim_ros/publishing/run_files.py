@@ -18,21 +18,11 @@ RRD_ENDING = ".rrd"
 
 @dataclass(frozen=True)
 class LogStatus:
-    """How a log is doing.
+    """How a log is doing."""
 
-    Attributes
-    ----------
-    dropped : int
-        Frames left out of it, as the disk was too slow.
-    waiting : int
-        Frames, inputs and events in its queue.
-    failure : str
-        Why it is not written further; empty as long as it is.
-    """
-
-    dropped: int = 0
-    failure: str = ""
-    waiting: int = 0
+    dropped: int = 0  # Frames left out of it, as the disk was too slow
+    failure: str = ""  # Why it is not written further; empty as long as it is
+    waiting: int = 0  # Frames, inputs and events in its queue
 
 
 class Recording:

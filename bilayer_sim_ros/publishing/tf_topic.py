@@ -16,10 +16,7 @@ PACKAGE = "tf2_msgs"
 def tf_prefix(node: Node, parameters: Mapping[str, Value]) -> str:
     """Return the prefix of the names of frames, the node's own full name; empty if /tf is not asked for.
 
-    Raises
-    ------
-    InputError
-        If it is asked for and its message type is not installed.
+    Raises InputError if it is asked for and its message type is not installed.
     """
     if not parameters["tf"]:
         return ""

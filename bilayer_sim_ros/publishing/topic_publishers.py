@@ -101,13 +101,7 @@ class FramePublisher:
 
 
 class ClockPublisher:
-    """Publishes times on /clock that are not those of frames.
-
-    Parameters
-    ----------
-    node : Node
-    description : Description
-    """
+    """Publishes times on /clock that are not those of frames."""
 
     def __init__(self, node: Node, description: Description):
         (spec,) = (spec for spec in output_topics(description) if spec.name == CLOCK_TOPIC)

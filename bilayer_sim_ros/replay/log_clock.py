@@ -14,23 +14,13 @@ LONGEST = 2**62
 class LogClock:
     """The time of a log, which runs at `rate` on a steady clock, or stands still.
 
-    Parameters
-    ----------
-    rate : float
-        Seconds of the log per second, above 0.
-    clock : callable
-        Steady clock [s].
-
-    Attributes
-    ----------
-    running : bool
-        At first it stands still, at 0.
+    `rate`: seconds of the log per second, above 0. `clock`: steady clock [s].
     """
 
     def __init__(self, rate: float, clock: Callable[[], float] = time.monotonic):
         self._clock = clock
         self._rate = rate
-        self.running = False
+        self.running = False  # At first it stands still, at 0
         self.jump(0)
 
     @property

@@ -26,18 +26,10 @@ SHORTEST_LOOP = nanoseconds(1e-3)
 
 
 class Outlet(Protocol):
-    """Where messages go.
+    """Where messages go."""
 
-    Attributes
-    ----------
-    channels : collection of int
-        Of the log, those that are played.
-    latched : mapping
-        Channel -> how many of its last messages those get who come late (transient local).
-    """
-
-    channels: Collection[int]
-    latched: Mapping[int, int]
+    channels: Collection[int]  # Of the log, those that are played
+    latched: Mapping[int, int]  # Channel -> how many of its last messages those get who come late (transient local)
 
     def restart(self) -> None:
         """Take note that messages of another time follow: at the start, after a seek, and when a loop begins again."""
@@ -60,37 +52,18 @@ class Outlet(Protocol):
 
 @dataclass(frozen=True)
 class Playback:
-    """Part of a log to play, and how to play it.
-
-    Attributes
-    ----------
-    begin, end : int
-        Times of the log between which it is played, both included [ns].
-    first : int
-        Where the first pass begins [ns].
-    rate : float
-        Seconds of the log per second.
-    loop : bool
-        Whether to begin again at the end.
-    paused : bool
-        Whether to wait for `Player.resume` at the start.
-    clock_rate : float
-        Clock messages per second of real time [Hz]; 0 = none.
-    clock_on_publish : bool
-        Whether a clock message with its time goes out right before each message.
-    stored_clock : bool
-        Whether the clock messages in the log are played.
-    """
+    """Part of a log to play, and how to play it."""
 
     begin: int
     end: int
-    first: int
-    rate: float = 1.0
-    loop: bool = False
-    paused: bool = False
-    clock_rate: float = 0.0
-    clock_on_publish: bool = False
-    stored_clock: bool = False
+    """`begin`, `end`: times of the log between which it is played, both included [ns]."""
+    first: int  # Where the first pass begins [ns]
+    rate: float = 1.0  # Seconds of the log per second
+    loop: bool = False  # Whether to begin again at the end
+    paused: bool = False  # Whether to wait for `Player.resume` at the start
+    clock_rate: float = 0.0  # Clock messages per second of real time [Hz]; 0 = none
+    clock_on_publish: bool = False  # Whether a clock message with its time goes out right before each message
+    stored_clock: bool = False  # Whether the clock messages in the log are played
 
 
 class Player:
@@ -112,13 +85,6 @@ class Player:
         Called with how much later than the rate asks messages have become in all [s], when that grows.
     finished : callable
         Called at the very end, in the player's thread.
-
-    Attributes
-    ----------
-    error : Exception or None
-        Why playing ended, unless it was stopped or reached the end.
-    lag : float
-        How much later than the rate asks messages have become in all [s of real time].
     """
 
     def __init__(
@@ -147,8 +113,8 @@ class Player:
         self._requests = Requests("playing has ended")
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._work, name="player")
-        self.error: Exception | None = None
-        self.lag = 0.0
+        self.error: Exception | None = None  # Why playing ended, unless it was stopped or reached the end
+        self.lag = 0.0  # How much later than the rate asks messages have become in all [s of real time]
 
     def start(self) -> None:
         """Start the thread."""

@@ -35,13 +35,7 @@ def replayed_run(node: Node, path: Path, names: set[str]) -> ReplayedRun | None:
 
 
 class ReplayedRun:
-    """Publishes ``~/description`` once, and the frames of a log on ``~/live`` while somebody subscribes to it.
-
-    Parameters
-    ----------
-    node : Node
-    description : Description
-    """
+    """Publishes ``~/description`` once, and the frames of a log on ``~/live`` while somebody subscribes to it."""
 
     def __init__(self, node: Node, description: Description):
         specs = {spec.full_name(): spec for spec in output_topics(description) if spec.name not in UNSHOWN}

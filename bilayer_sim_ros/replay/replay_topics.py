@@ -45,33 +45,15 @@ class ReplayTopics:
 
     The first markers of each pass begin with one that deletes all: viewers keep those of another time otherwise.
 
-    Parameters
-    ----------
-    node : Node
-    log : IndexedLog
-    playback : Playback
-        Which clock is published, if any.
-    warn : callable
-        Called once for each type that cannot be published, and once for each other fault of a topic.
-
-    Attributes
-    ----------
-    channels : set of int
-        Those that can be published.
-    latched : dict
-        Channel -> depth, of those that are transient local.
-
-    Raises
-    ------
-    InputError
-        If the log's own clock is asked for, and it holds none.
+    `playback`: which clock is published, if any. `warn`: called once for each type that cannot be published, and once
+    for each other fault of a topic. Raises InputError if the log's own clock is asked for, and it holds none.
     """
 
     def __init__(self, node: Node, log: IndexedLog, playback: Playback, warn: Callable[[str], None]):
         self._node, self._warn = node, warn
         self._topics = {channel.number: channel.topic for channel in log.channels}
         self._publishers: dict[int, Publisher] = {}
-        self.latched: dict[int, int] = {}
+        self.latched: dict[int, int] = {}  # Channel -> depth, of those that are transient local
         self._markers = {channel.number for channel in log.channels if channel.type == MARKER_ARRAY}
         self._stale: set[int] = set()
         self._unsendable: set[int] = set()
@@ -92,7 +74,7 @@ class ReplayTopics:
             raise InputError(
                 f"parameter 'play.clock_from_log' is true, and {log.path} holds no {CLOCK_TOPIC} to publish"
             )
-        self.channels = set(self._publishers)
+        self.channels = set(self._publishers)  # Those that can be published
         made = playback.clock_rate > 0.0 or playback.clock_on_publish
         self._clock = node.create_publisher(Clock, CLOCK_TOPIC, QoSProfile(depth=1)) if made else None
         self._run = replayed_run(node, log.path, names)

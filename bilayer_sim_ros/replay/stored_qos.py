@@ -26,15 +26,8 @@ def offered_profile(text: str) -> QoSProfile:
     each of them kept its own last messages, so that the depths add up. Names stay those of ROS topics: without its
     conventions (``avoid_ros_namespace_conventions``) a log could publish what looks like requests to services.
 
-    Parameters
-    ----------
-    text : str
-        YAML: a list of profiles, with policies as numbers of `rmw` or by name.
-
-    Raises
-    ------
-    InputError
-        If that cannot be understood.
+    `text`: a YAML list of profiles, with policies as numbers of `rmw` or by name. Raises InputError if that cannot be
+    understood.
     """
     try:
         content = read_yaml(text, "YAML")

@@ -22,32 +22,20 @@ UNKNOWN = (math.nan,) * 3
 
 @dataclass(frozen=True)
 class EntityState:
-    """State of an entity at a time [s], in the world's frame.
-
-    Attributes
-    ----------
-    time : float
-    position, velocity, angular_velocity : sequence of float
-        [m], [m/s], [rad/s]; NaN for what is not known.
-    quaternion : sequence of float
-        Orientation x y z w.
-    """
+    """State of an entity at a time [s], in the world's frame."""
 
     time: float
     position: tuple[float, ...]
-    quaternion: tuple[float, ...]
+    quaternion: tuple[float, ...]  # Orientation x y z w
     velocity: tuple[float, ...]
     angular_velocity: tuple[float, ...]
+    """`position`, `velocity`, `angular_velocity`: [m], [m/s], [rad/s]; NaN for what is not known."""
 
 
 class Entities:
     """Bodies, and rods: the pose of a rod is that of its first node, with the material frame there.
 
     A rod that has the name of a body is called ``rods/<name>``.
-
-    Parameters
-    ----------
-    description : Description
     """
 
     def __init__(self, description: Description):

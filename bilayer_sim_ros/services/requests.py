@@ -24,10 +24,7 @@ def answered(value: Any) -> Future:
 class Requests:
     """Requests in the order in which they came; any thread asks, one serves.
 
-    Parameters
-    ----------
-    ended : str
-        What requests are told that come too late.
+    `ended`: the answer to requests that come too late.
     """
 
     def __init__(self, ended: str = "the simulation has ended"):

@@ -18,13 +18,7 @@ from bilayer_sim_ros.services.trigger_services import Service
 
 
 def rosbag2_services(node: Node, player: Player) -> list[Service]:
-    """Return all services of rosbag2's player.
-
-    Raises
-    ------
-    InputError
-        If their types are not installed.
-    """
+    """Return all services of rosbag2's player. Raises InputError if their types are not installed."""
     try:
         from rosbag2_interfaces import srv
 

@@ -67,13 +67,7 @@ def simulator_services(
 ) -> list[Service]:
     """Return all of them, or none where their types are not installed; the console says which.
 
-    Parameters
-    ----------
-    node : Node
-    worker : Worker
-    description : Description
-    quit : callable
-        Ends the simulation for a reason.
+    `quit`: ends the simulation for a reason.
     """
     try:
         from simulation_interfaces import srv

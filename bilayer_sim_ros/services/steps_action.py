@@ -20,13 +20,8 @@ NAME = "simulate_steps"
 def offer_steps(node: Node, step: Callable[[], Future], services: Services) -> bool:
     """Offer the action under a node's name where its types are installed; return whether it is.
 
-    Parameters
-    ----------
-    node : Node
-    step : callable
-        Asks for one output period of a paused simulation.
-    services : Services
-        The node's others, with which an answer is waited for when the node ends.
+    `step`: asks for one output period of a paused simulation. `services`: the node's others, with which an answer is
+    waited for when the node ends.
     """
     try:
         from simulation_interfaces import action
@@ -52,12 +47,7 @@ def offer_steps(node: Node, step: Callable[[], Future], services: Services) -> b
 class StepsGoal:
     """Does what goals ask for: so many steps, one after the other, with feedback after each.
 
-    Parameters
-    ----------
-    action : type
-        `SimulateSteps`.
-    step, services
-        As for `offer_steps`.
+    `action`: `SimulateSteps`. `step`, `services`: as for `offer_steps`.
     """
 
     def __init__(self, action: Any, step: Callable[[], Future], services: Services):

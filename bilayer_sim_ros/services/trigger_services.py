@@ -25,24 +25,13 @@ LAST_ANSWERS = 1.0
 
 @dataclass(frozen=True)
 class Service:
-    """One service.
+    """One service."""
 
-    Attributes
-    ----------
-    name : str
-        Under the node's own.
-    type : type
-        Of requests and responses.
-    ask : callable
-        Has what a request says done; returns the future of what came of it. `BilayerError` is a refusal.
-    answer : callable
-        Writes that into a response, from the future, which is done.
-    """
-
-    name: str
-    type: type
+    name: str  # Under the node's own
+    type: type  # Of requests and responses
     ask: Callable[[Any], Future]
-    answer: Callable[[Any, Future], None]
+    """Has what a request says done; returns the future of what came of it. `BilayerError` is a refusal."""
+    answer: Callable[[Any, Future], None]  # Writes that into a response, from the future, which is done
 
 
 def trigger(name: str, ask: Callable[[], Future]) -> Service:
@@ -58,13 +47,7 @@ def _say(response: Trigger.Response, future: Future) -> None:
 
 
 class Services:
-    """Services of a node, each answered from a future; messages and other requests are served meanwhile.
-
-    Parameters
-    ----------
-    node : Node
-    services : iterable of Service
-    """
+    """Services of a node, each answered from a future; messages and other requests are served meanwhile."""
 
     def __init__(self, node: Node, services: Iterable[Service]):
         self._node = node

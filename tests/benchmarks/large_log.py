@@ -14,6 +14,7 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -53,7 +54,6 @@ def write_log(path: Path, megabytes: float, rate: float = 50.0, every: int = 1) 
 
 def copy_of(frame):
     """A frame that waits for the writer may not change."""
-    from dataclasses import replace
 
     return replace(frame)
 

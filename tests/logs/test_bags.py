@@ -16,6 +16,7 @@ from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_core.log.messages.cdr import HEADER
 from bilayer_core.log.messages.encoders import multi_array_template
 from bilayer_core.log.run.log_reader import read_info
+from bilayer_core.view.rerun_view import convert_log
 
 ROBOT = "/lab/robot1"
 DOUBLE = "std_msgs/msg/Float64"
@@ -149,8 +150,6 @@ def test_a_bag_of_some_topics_is_shown_and_says_what_it_lacks(names, messages, t
     lacks = read_info(bag).lacks
     assert all(any(f"{ROBOT}/{name}" in lack for lack in lacks) for name in names)
     with pytest.raises(InputError, match=f"nodes, {ROBOT}/points, which is drawn"):
-        from bilayer_core.view.rerun_view import convert_log
-
         convert_log(write_bag(tmp_path / "few", without(messages, *names, "nodes", "points")), tmp_path / "few.rrd")
 
 

@@ -8,6 +8,7 @@ from rosbags.typesys import Stores, get_typestore
 from support import synthetic_run
 
 from bilayer_core import Simulator, load_scene, read_log
+from bilayer_core.log.file import mcap_log
 from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_core.log.messages.event_messages import decode_event, encode_event
 from bilayer_core.log.messages.events import DEBUG, INFO, REJECTED_FRAMES, WARN, Event, EventDetector, late_stimulus
@@ -131,8 +132,6 @@ def test_bodies_are_named_with_what_they_touch_before_the_first_step():
 
 
 def test_an_older_log_has_no_events(tmp_path, monkeypatch):
-    from bilayer_core.log.file import mcap_log
-
     before = mcap_log.input_topics
     monkeypatch.setattr(mcap_log, "input_topics", lambda of: tuple(s for s in before(of) if s is not EVENTS))
     monkeypatch.setattr(mcap_log._LogFile, "_add_events", lambda self, events: None)

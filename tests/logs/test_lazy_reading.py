@@ -5,6 +5,9 @@ import tracemalloc
 import numpy as np
 import pytest
 from benchmarks.large_log import write_log
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, IndexType, Writer
 from support import synthetic_run
 
 from bilayer_core import compare, read_log
@@ -135,9 +138,6 @@ def test_blocks_of_any_size_have_the_same_rows(log):
 
 
 def test_a_file_of_another_writer_without_chunks_or_index_is_read(log, tmp_path):
-    from mcap.reader import make_reader
-    from mcap.writer import CompressionType, IndexType, Writer
-
     for name, options in {
         "bare": {"use_chunking": False},
         "zstd": {"compression": CompressionType.ZSTD, "index_types": IndexType.NONE, "use_statistics": False},
@@ -174,7 +174,5 @@ def test_an_index_that_says_other_times_is_noticed(log, tmp_path):
 
 
 def test_opcodes_are_those_of_the_format():
-    from mcap.opcode import Opcode
-
     names = ("HEADER", "FOOTER", "SCHEMA", "CHANNEL", "MESSAGE", "CHUNK", "MESSAGE_INDEX", "ATTACHMENT", "METADATA")
     assert all(getattr(log_records, name) == Opcode[name] for name in (*names, "DATA_END"))

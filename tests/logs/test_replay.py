@@ -13,6 +13,7 @@ from bilayer_core.cli import main
 from bilayer_core.errors import InputError
 from bilayer_core.log.file import mcap_log
 from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_core.log.messages.topics import EVENTS, stimulus_topics
 from bilayer_core.log.run.log_reader import read_info, read_log, read_state
 from bilayer_core.observed.inputs import LOAD, POSE, STIMULUS, UNTIL, Input
 from bilayer_core.runs import replay
@@ -181,8 +182,6 @@ def test_a_log_of_before_says_what_it_lacks(tmp_path, monkeypatch):
 
 
 def mcap_log_stimuli(description):
-    from bilayer_core.log.messages.topics import EVENTS, stimulus_topics
-
     return (EVENTS, *stimulus_topics(description))
 
 

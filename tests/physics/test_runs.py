@@ -5,7 +5,7 @@ import pytest
 from support.sample_scenes import everything
 
 from bilayer_core import Simulator, load_scene, read_log
-from bilayer_core.errors import InputError
+from bilayer_core.errors import InputError, SceneError
 from bilayer_core.runs.replay import verify
 from bilayer_core.simulation import stepper
 from bilayer_core.simulation.run_result import Termination
@@ -186,8 +186,6 @@ def test_overrides_may_be_values_by_path():
     ],
 )
 def test_overrides_that_are_none_are_refused(overrides, fault):
-    from bilayer_core.errors import SceneError
-
     with pytest.raises(SceneError, match=fault):
         load_scene(everything(), overrides)
 

@@ -1,5 +1,7 @@
 """The bundled flagellum swims as fast as resistive-force theory says, and the way it says."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -44,6 +46,7 @@ def resistive_speed(along, across):
     return 0.5 * (low + high)
 
 
+@cache
 def speeds(*changes, seconds=8.0, **options):
     """Mean speed of the mass centre [m/s] over each of the last two periods."""
     simulator = Simulator(load_scene("flagellum", list(changes)), **options)

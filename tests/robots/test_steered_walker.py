@@ -1,5 +1,7 @@
 """The bundled walker with three legs goes straight on and turns to the side of the leg that rests."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ HALF = "{type: sine, mean: 0.25, amplitude: 0.25, period: 1 s, phase: -90 deg}"
 RESTING = "{type: hold, value: 0}"
 
 
+@cache
 def driven(left, right, *changes, cycles=3, **options):
     """Way of the hub in its own axes [m] and its turn to the left [deg] over each of some cycles, after the first."""
     schedules = [f"stimuli.left.schedule={left}", f"stimuli.right.schedule={right}"]

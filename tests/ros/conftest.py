@@ -5,7 +5,9 @@ import math
 import os
 import time
 from contextlib import suppress
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import rclpy
 from rcl_interfaces.srv import GetParameters, GetParameterTypes, SetParameters
@@ -14,8 +16,11 @@ from rclpy.executors import SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
-from support import forked
+from support import forked, synthetic_run
 from support.processes import claimed_domain
+
+from bilayer_core.log.file.mcap_log import McapRecorder
+from bilayer_sim_ros.simulation_node import SimulationNode
 
 NODE = "/bilayer_sim"
 # Longest wait for anything that needs discovery or a first compilation [s].
@@ -226,3 +231,41 @@ def domain(residents):
 @pytest.fixture(scope="module")
 def domain_of_module(residents):
     yield from inhabited(residents)
+
+
+@pytest.fixture(scope="module")
+def run_log(tmp_path_factory):
+    """Half a second of a run, all topics."""
+    path = tmp_path_factory.mktemp("logs") / "run.mcap"
+    synthetic_run.run(McapRecorder(path, 50.0, 20.0), np.linspace(0.0, 0.5, 26))
+    return path
+
+
+@pytest.fixture
+def contexts(domain):
+    """Two contexts: one alone refuses two types of a topic, and a client in the other is another participant."""
+    made = Context(), Context()
+    for context in made:
+        rclpy.init(context=context, domain_id=domain)
+    yield made
+    for context in made:
+        context.try_shutdown()
+
+
+@pytest.fixture
+def noting_node(contexts, monkeypatch):
+    """Makes a node of a scene that is not started, and notes its warnings as `lines`."""
+    nodes = []
+
+    def make(scene="bending", cli_args=None, **values):
+        overrides = [Parameter(name, value=value) for name, value in {"scene": scene, **values}.items()]
+        node = SimulationNode(context=contexts[0], cli_args=cli_args, parameter_overrides=overrides)
+        node.lines = []
+        logger = SimpleNamespace(warning=lambda text, **_: node.lines.append(text))
+        monkeypatch.setattr(node, "get_logger", lambda: logger)
+        nodes.append(node)
+        return node
+
+    yield make
+    for node in nodes:
+        node.destroy_node()

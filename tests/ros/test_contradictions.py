@@ -3,18 +3,14 @@
 import time
 
 import pytest
-import rclpy
-from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from bilayer_core.scene.schedule import Hold
 from bilayer_sim_ros.control.contradictions import Contradictions, Source
 from bilayer_sim_ros.control.stimulus import Channel
-from bilayer_sim_ros.simulation_node import SimulationNode
 
 HEAT = Channel("heat", 0.0, 1.0, Hold(type="hold", value=0.0))
 A, B, C = (Source("/stimulus_stamped", name) for name in (b"a", b"b", b"c"))
@@ -77,23 +73,8 @@ def test_one_that_comes_back_much_later_is_not_told():
     assert listened.told == []
 
 
-@pytest.fixture
-def contexts(domain):
-    """Two, so that a client is another participant."""
-    made = Context(), Context()
-    for context in made:
-        rclpy.init(context=context, domain_id=domain)
-    yield made
-    for context in made:
-        rclpy.shutdown(context=context)
-
-
-def test_the_node_warns_once_with_channel_values_topics_and_nodes(contexts, monkeypatch):
-    node = SimulationNode(context=contexts[0], parameter_overrides=[Parameter("scene", value="bending")])
-    lines = []
-    monkeypatch.setattr(
-        node, "get_logger", lambda: type("Log", (), {"warning": lambda _, text, **__: lines.append(text)})()
-    )
+def test_the_node_warns_once_with_channel_values_topics_and_nodes(contexts, noting_node):
+    node = noting_node()
     client, other = Node("open_loop", context=contexts[1]), Node("closed_loop", namespace="lab", context=contexts[1])
     plain = client.create_publisher(Float64, "/bilayer_sim/stimulus/swelling", 10)
     stamped = other.create_publisher(JointState, "/bilayer_sim/stimulus_stamped", 10)
@@ -104,11 +85,10 @@ def test_the_node_warns_once_with_channel_values_topics_and_nodes(contexts, monk
         stamped.publish(JointState(name=["swelling"], position=[0.75]))
         for _ in range(4):
             executor.spin_once(timeout_sec=0.02)
-        if (lines and turn > 50) or time.monotonic() > deadline:
+        if (node.lines and turn > 50) or time.monotonic() > deadline:
             break
     executor.shutdown()
-    node.destroy_node()
-    (line,) = lines
+    (line,) = node.lines
     assert line.startswith("stimulus 'swelling' gets ") and "contradict each other" in line
     assert "0.25 on /bilayer_sim/stimulus/swelling (/open_loop)" in line
     assert "0.75 on /bilayer_sim/stimulus_stamped (/lab/closed_loop)" in line

@@ -3,10 +3,8 @@
 import time
 
 import pytest
-import rclpy
 from geometry_msgs.msg import PoseStamped
 from rcl_interfaces.srv import SetParameters
-from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -16,42 +14,15 @@ from bilayer_core.errors import InputError
 from bilayer_sim_ros.control.pending_changes import Commands
 from bilayer_sim_ros.node import graph_watch
 from bilayer_sim_ros.node.parameters import SIM_NODE, accept_all
-from bilayer_sim_ros.simulation_node import SimulationNode
 
 LONG = "\x1b[31m" + "x" * 500_000
 SHORT = 500
 """Characters."""
 
 
-class Logger:
-    """Notes what is said."""
-
-    def __init__(self):
-        self.lines = []
-
-    def warning(self, text, **_):
-        self.lines.append(text)
-
-
 @pytest.fixture
-def contexts(domain):
-    made = Context(), Context()
-    for context in made:
-        rclpy.init(context=context, domain_id=domain)
-    yield made
-    for context in made:
-        rclpy.shutdown(context=context)
-
-
-@pytest.fixture
-def node(contexts, monkeypatch):
-    """A node that is not started, and notes its warnings."""
-    node = SimulationNode(context=contexts[0], parameter_overrides=[Parameter("scene", value="bending")])
-    logger = Logger()
-    monkeypatch.setattr(node, "get_logger", lambda: logger)
-    node.lines = logger.lines
-    yield node
-    node.destroy_node()
+def node(noting_node):
+    return noting_node()
 
 
 def assert_short(text):

@@ -3,8 +3,6 @@
 import time
 
 import pytest
-import rclpy
-from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -60,51 +58,20 @@ def test_remapped_names_are_read_from_the_command_line():
     assert list(remap_sources(argv.split())) == ["~/stimuls", "com"]
 
 
-class Logger:
-    def __init__(self):
-        self.lines = []
-
-    def warning(self, text, **_):
-        self.lines.append(text)
-
-
 @pytest.fixture
-def contexts(domain):
-    """Two contexts: one alone refuses two types of a topic."""
-    contexts = [Context(), Context()]
-    for context in contexts:
-        rclpy.init(context=context, domain_id=domain)
-    yield contexts
-    for context in contexts:
-        context.try_shutdown()
-
-
-@pytest.fixture
-def context(contexts):
-    return contexts[0]
-
-
-@pytest.fixture
-def node(context, monkeypatch):
-    """A node of the gripper that has a remapped topic and notes its warnings; it is made but not started."""
+def node(noting_node, monkeypatch):
+    """A node of the gripper that has a remapped topic."""
     monkeypatch.setattr(graph_watch, "PERIOD", 0.05)
-    arguments = ["--ros-args", "-r", "~/stimulus:=/everything"]
-    overrides = [Parameter("scene", value="gripping"), Parameter("real_time_factor", value=0.0)]
-    node = SimulationNode(context=context, cli_args=arguments, parameter_overrides=overrides)
-    logger = Logger()
-    monkeypatch.setattr(node, "get_logger", lambda: logger)
-    node.lines = logger.lines
-    yield node
-    node.destroy_node()
+    return noting_node("gripping", ["--ros-args", "-r", "~/stimulus:=/everything"], real_time_factor=0.0)
 
 
-def test_a_near_miss_in_the_graph_is_warned_of_once(node, context, contexts):
+def test_a_near_miss_in_the_graph_is_warned_of_once(node, contexts):
     client = Node("client", context=contexts[1])
     client.create_publisher(Float64, "/bilayer_sim/stimulus/humidty", 10)
     client.create_publisher(Float32, "/everything", 10)
     client.create_subscription(Float64, "/bilayer_sim/energi", print, 10)
     client.create_subscription(Float64, "/bilayer_sim/image", print, 10)
-    executor = SingleThreadedExecutor(context=context)
+    executor = SingleThreadedExecutor(context=contexts[0])
     executor.add_node(node)
     for _ in range(400):
         executor.spin_once(timeout_sec=0.05)
@@ -120,7 +87,7 @@ def test_a_near_miss_in_the_graph_is_warned_of_once(node, context, contexts):
     ]
 
 
-def test_those_who_listen_and_can_hear_nothing_are_warned_of_once(node, context, contexts):
+def test_those_who_listen_and_can_hear_nothing_are_warned_of_once(node, contexts):
     client = Node("client", context=contexts[1])
     kept = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     lossy = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -142,8 +109,8 @@ def test_those_who_listen_and_can_hear_nothing_are_warned_of_once(node, context,
     )
 
 
-def test_a_second_clock_is_warned_of(node, context):
-    other = SimulationNode("other", context=context, parameter_overrides=[Parameter("scene", value="bending")])
+def test_a_second_clock_is_warned_of(node, contexts):
+    other = SimulationNode("other", context=contexts[0], parameter_overrides=[Parameter("scene", value="bending")])
     try:
         watch, deadline = graph_watch.GraphWatch(node), time.monotonic() + 20.0
         while not node.lines and time.monotonic() < deadline:

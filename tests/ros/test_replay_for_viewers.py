@@ -2,29 +2,18 @@
 
 import signal
 
-import numpy as np
-import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
-from support import recordings, synthetic_run
+from support import recordings
 from support.written_logs import number, write_log
 from visualization_msgs.msg import Marker, MarkerArray
 
-from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_core.log.messages.description_text import from_json
 from bilayer_core.log.run.log_reader import read_description
 
 NODE = "/bilayer_replay"
 EPOCH = 1_764_000_000.0
-
-
-@pytest.fixture(scope="module")
-def run_log(tmp_path_factory):
-    """Half a second of a run, all topics."""
-    path = tmp_path_factory.mktemp("logs") / "run.mcap"
-    synthetic_run.run(McapRecorder(path, 50.0, 20.0), np.linspace(0.0, 0.5, 26))
-    return path
 
 
 def test_markers_of_another_time_are_deleted_at_the_start_after_a_seek_and_in_each_loop(

@@ -8,19 +8,16 @@ import subprocess
 import time
 from functools import partial
 
-import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
-from support import synthetic_run
 from support.processes import bilayer, command, environment
 from support.written_logs import LATCHED, number, value_of, write_log
 
 from bilayer_core.cli import main
 from bilayer_core.log.file.indexed_log import IndexedLog
-from bilayer_core.log.file.mcap_log import McapRecorder
 from bilayer_core.log.run.log_reader import read_messages
 from bilayer_sim_ros.node.parameters import REPLAY_NODE
 from bilayer_sim_ros.replay.log_replay import playback_of
@@ -28,14 +25,6 @@ from bilayer_sim_ros.replay.log_replay import playback_of
 NODE = "/bilayer_replay"
 PAUSED = {"play.start_paused": True}
 DEEP = QoSProfile(depth=1000)
-
-
-@pytest.fixture(scope="module")
-def run_log(tmp_path_factory):
-    """Half a second of a run, all topics."""
-    path = tmp_path_factory.mktemp("logs") / "run.mcap"
-    synthetic_run.run(McapRecorder(path, 50.0, 20.0), np.linspace(0.0, 0.5, 26))
-    return path
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ import time
 
 import numpy as np
 import pytest
+import yaml
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import SceneError
@@ -240,7 +241,6 @@ def test_as_many_nodes_as_are_allowed_are_built_in_time_and_memory():
 def with_table(directory, file):
     content = scene([rod([layer(eigenstrain={"stimulus": "lamp", "gain": 0.01})])])
     content["stimuli"] = {"lamp": {"schedule": {"type": "csv", "file": file, "value_column": "value"}}}
-    import yaml
 
     return written(directory, yaml.safe_dump(content))
 

@@ -1,9 +1,12 @@
 """The verb `stress`, as it is called."""
 
 import json
+import os
 import re
+import signal
 import subprocess
 import sys
+import time
 from functools import partial
 from pathlib import Path
 
@@ -17,7 +20,7 @@ from bilayer_core.verification.stress.parameters import Parameters
 from bilayer_core.verification.stress.pool import run_cases
 from bilayer_core.verification.stress.robots import scene_of
 from bilayer_core.verification.stress.shrink import shrink
-from bilayer_core.verification.stress.stress_case import Outcome, Record, StressCase
+from bilayer_core.verification.stress.stress_case import Decision, Outcome, Record, StressCase
 
 ONE = "restitution/0.5/ball/laminate"
 
@@ -75,8 +78,6 @@ def test_a_last_line_that_was_cut_off_is_done_again(tmp_path):
 
 
 def hangs(trial):
-    import time
-
     time.sleep(1e4)
 
 
@@ -85,14 +86,10 @@ def takes_all_memory(trial):
 
 
 def dies(trial):
-    import os
-
     os._exit(7)
 
 
 def fine(trial):
-    from bilayer_core.verification.stress.stress_case import Decision
-
     return Decision("nothing", 1.0, 0.0, 2.0)
 
 
@@ -121,17 +118,12 @@ def test_a_failure_is_made_smaller_and_runs_again(tmp_path):
 
 
 def is_stiff(limit, trial):
-    from bilayer_core.verification.stress.stress_case import Decision
-
     stiffness = trial.simulator.scene.materials["lower"].youngs_modulus
     return Decision("stiff: too much", stiffness, 0.0, limit)
 
 
 @pytest.mark.verify
 def test_an_interrupted_run_ends_at_once_and_keeps_what_it_has(tmp_path):
-    import signal
-    import time
-
     command = [sys.executable, "-m", "bilayer_core", "stress", "--only", "integrator/sdirk2/*", "--out", str(tmp_path)]
     command += ["--workers", "1"]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)

@@ -1,5 +1,7 @@
 """The command `bilayer sweep`, as a user sees it."""
 
+import sys
+
 import pytest
 import yaml
 
@@ -63,8 +65,6 @@ def test_a_bad_file_is_one_message_and_exit_code_2(call, content, told):
 
 
 def test_without_dask_the_command_says_what_to_install(call, monkeypatch):
-    import sys
-
     monkeypatch.setitem(sys.modules, "distributed", None)
     code, _, err = call()
     assert code == 2

@@ -1,5 +1,6 @@
 """Searches: they find what is known, go on after a kill, and confirm what they found."""
 
+import json
 from dataclasses import replace
 
 import pytest
@@ -10,6 +11,7 @@ from bilayer_core import load_scene, optimise
 from bilayer_core.cli import main
 from bilayer_core.cli.optimise import lines
 from bilayer_core.errors import InputError
+from bilayer_core.studies.sweeps.execute_runs import execute
 from bilayer_core.studies.sweeps.journal import Journal
 from bilayer_core.studies.sweeps.optimise import Search, finer_job
 from bilayer_core.studies.sweeps.run_sweep import read_sweep
@@ -29,7 +31,6 @@ def ranges():
 
 def search_in_process(content, metric, trials, functions=None):
     """A search without processes, as `optimise` makes it with one worker."""
-    from bilayer_core.studies.sweeps.execute_runs import execute
 
     read = read_sweep(content, functions=functions, is_search=True)
     search, rows = Search(read, metric, True, 3), []
@@ -69,8 +70,6 @@ def test_a_search_that_is_continued_knows_what_was_tried(ranges):
 
 
 def test_a_finer_run_has_a_tenth_of_the_tolerance_or_a_quarter_of_the_step(ranges):
-    import json
-
     read = read_sweep(ranges, is_search=True)
     values = {"gain": 1.0, "length": 80.0}
     finer = json.loads(finer_job(read.job, values).scene)["solver"]

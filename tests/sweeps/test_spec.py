@@ -3,6 +3,7 @@
 import pytest
 
 from bilayer_core.errors import InputError
+from bilayer_core.scene.loader import load_scene, scene_text
 from bilayer_core.studies.sweeps.design import runs_of
 from bilayer_core.studies.sweeps.run_sweep import read_sweep
 from bilayer_core.studies.sweeps.spec import read_spec
@@ -122,8 +123,6 @@ def test_a_million_runs_are_allowed_and_more_are_not(strip):
 
 
 def test_files_are_relative_to_the_sweep_file(tmp_path, monkeypatch):
-    from bilayer_core.scene.loader import load_scene, scene_text
-
     folder = tmp_path / "there"
     folder.mkdir()
     (folder / "own.yaml").write_text(scene_text(load_scene("bending")))

@@ -14,8 +14,9 @@ import yaml
 from support.processes import TIMEOUT, environment
 from support.sweep_programs import address_in, await_workers, end, start_scheduler, start_worker, wait_until
 
-from bilayer_core import read_results
+from bilayer_core import read_log, read_results
 from bilayer_core.errors import EngineError, InputError
+from bilayer_core.scene.loader import load_scene, scene_content
 from bilayer_core.studies.sweeps.job import Outcome
 from bilayer_core.studies.sweeps.open_processes import Processes, open_engine
 from bilayer_core.studies.sweeps.run_sweep import read_sweep, sweep
@@ -47,7 +48,6 @@ def test_a_cluster_makes_all_runs_and_this_machine_makes_the_same(strip, cluster
 def test_scenes_and_tables_travel_with_the_runs(cluster, tmp_path, monkeypatch):
     (tmp_path / "table.csv").write_text("time,value\n0,0\n0.3,1\n")
     schedule = {"type": "csv", "file": "table.csv", "value_column": "value"}
-    from bilayer_core.scene.loader import load_scene, scene_content
 
     content = scene_content(load_scene("bending"))
     content["stimuli"]["swelling"]["schedule"] = schedule
@@ -210,7 +210,6 @@ def test_a_sweep_killed_at_random_moments_is_completed_and_nothing_is_made_twice
         counts.append(len(made))
     assert start().wait() == 0
     assert made.items() <= rows().items() and len(rows()) == 2 * (10 + MOMENTS)
-    from bilayer_core import read_log, read_results
 
     found = read_results(out)
     assert found.outcomes == {"done": len(rows())}

@@ -14,14 +14,8 @@ class Backlog(Generic[Item]):
     """Items on their way from one thread to another, which takes many at a time.
 
     To hand one over costs the first thread some microseconds, whatever the other one does: that is woken for the first
-    item alone, and again when the queue is half full.
-
-    Parameters
-    ----------
-    capacity : int
-        Of items.
-    gathering : float
-        Wall time for which the taker waits for more after the first one [s].
+    item alone, and again when the queue is half full. `capacity`: number of items. `gathering`: wall time for which the
+    taker waits for more after the first one [s].
     """
 
     def __init__(self, capacity: int, gathering: float):
@@ -37,16 +31,8 @@ class Backlog(Generic[Item]):
     def put(self, item: Item, patience: float | None = None) -> bool:
         """Put an item into the queue when there is room for it.
 
-        Parameters
-        ----------
-        item : Item
-        patience : float, optional
-            Longest wait for room [s]; without one as long as it takes.
-
-        Returns
-        -------
-        bool
-            Whether it was handed over: there was room in time, and the queue is not closed.
+        `patience`: longest wait for room [s]; without one as long as it takes. Returns whether it was handed over:
+        there was room in time, and the queue is not closed.
         """
         with self._changed:
             if len(self._items) >= self._capacity and patience != 0.0:

@@ -64,22 +64,13 @@ def split_topic(topic: str, ros_type: str) -> tuple[str, str] | None:
 
 @dataclass
 class Track:
-    """The messages of one topic, in the order of the files.
-
-    Attributes
-    ----------
-    sent, stamps : ndarray
-        When each was sent, and its simulated time [ns], shape (messages,).
-    runs : ndarray
-        Number of the run that it is of, from 0; -1: of none. Shape (messages,).
-    first : bytes
-        The first message.
-    """
+    """The messages of one topic, in the order of the files."""
 
     sent: Array
     stamps: Array
-    runs: Array
-    first: bytes
+    """`sent`, `stamps`: when each was sent, and its simulated time [ns], shape (messages,)."""
+    runs: Array  # Number of the run that it is of, from 0; -1: of none. Shape (messages,).
+    first: bytes  # The first message
 
     def of_run(self, number: int) -> Array:
         """Return which messages are those of a run: in it, time only grows."""
@@ -91,30 +82,16 @@ class Track:
 
 @dataclass
 class NodeTracks:
-    """Messages and runs of one node in a bag.
+    """Messages and runs of one node in a bag."""
 
-    Attributes
-    ----------
-    node : str
-        Full name of the node.
-    tracks : dict
-        Name of a topic under the node's -> its messages; those of topics without any are left out.
-    descriptions : list of (int, bytes)
-        When each description was sent [ns], and it.
-    runs : list of (int, int)
-        Simulated time of the first and the last message of each run [ns].
-    stamped : bool
-        Whether any messages have stamps; otherwise times are those since the first one came.
-    certain : bool
-        Whether the frames of messages without stamps are certain, see `match_frames`.
-    """
-
-    node: str
+    node: str  # Full name of the node
     tracks: dict[str, Track] = field(default_factory=dict)
-    descriptions: list[tuple[int, bytes]] = field(default_factory=list)
+    """Name of a topic under the node's -> its messages; those of topics without any are left out."""
+    descriptions: list[tuple[int, bytes]] = field(default_factory=list)  # When each description was sent [ns], and it
     runs: list[tuple[int, int]] = field(default_factory=list)
-    stamped: bool = True
-    certain: bool = True
+    """Simulated time of the first and the last message of each run [ns]."""
+    stamped: bool = True  # Whether any messages have stamps; otherwise times are those since the first one came
+    certain: bool = True  # Whether the frames of messages without stamps are certain, see `match_frames`
 
     def description_of(self, number: int) -> bytes | None:
         """Return the last description that was sent before a run began, or the first one; None without any."""

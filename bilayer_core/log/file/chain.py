@@ -73,12 +73,7 @@ class Link:
 class Chain:
     """The hash of a log, message by message.
 
-    Parameters
-    ----------
-    scene_text : str
-        Scene in the log.
-    head : mapping
-        Metadata records by name; those of `HASHED` count.
+    `scene_text`: scene in the log. `head`: metadata records by name; those of `HASHED` count.
     """
 
     def __init__(self, scene_text: str, head: Mapping[str, Mapping[str, str]]):
@@ -119,36 +114,17 @@ def place_in_state(description: Description, part: str) -> int | None:
 
 @dataclass(frozen=True)
 class Wholeness:
-    """Verdict of a log's hash on its states and inputs.
+    """Verdict of a log's hash on its states and inputs."""
 
-    Attributes
-    ----------
-    hashed : bool
-        Whether the log has a hash; older ones have none.
-    whole : bool
-        Whether all states and inputs that were written are there, unchanged, to the end of the run.
-    reason : str
-        What is wrong, as a sentence; empty where nothing is.
-    """
-
-    hashed: bool
-    whole: bool
-    reason: str = ""
+    hashed: bool  # Whether the log has a hash; older ones have none
+    whole: bool  # Whether all states and inputs that were written are there, unchanged, to the end of the run
+    reason: str = ""  # What is wrong, as a sentence; empty where nothing is
 
 
 def check_chain(path: str | Path, description: Description) -> Wholeness:
     """Compute the hash of a log, and compare it with what the log says of it.
 
-    Parameters
-    ----------
-    path : str or Path
-    description : Description
-        That of the log.
-
-    Raises
-    ------
-    InputError
-        If the file is no log, or is damaged.
+    `description`: that of the log. Raises InputError if the file is no log, or is damaged.
     """
     path = Path(path)
     chain, links, end = _read_links(path, description.scene_text)

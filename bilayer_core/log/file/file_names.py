@@ -17,14 +17,8 @@ def file_names(names: Iterable[str], taken: Iterable[str] = ()) -> dict[str, str
 
     Names that scenes allow keep their letters. Of others each byte that is not a letter, a digit, ``_`` or ``-``
     becomes ``%`` and two digits, so no part is ``..`` or empty. Long names are cut, and names that some file systems
-    take for the same get an ending of their own.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Such as ``rod/strip/position``.
-    taken : iterable of str
-        Paths that are not to be used.
+    take for the same get an ending of their own. `names`: such as ``rod/strip/position``. `taken`: paths that are not
+    to be used.
     """
     used, found = set(taken), {}
     for name in names:

@@ -28,22 +28,7 @@ Message = tuple[str, int, bytes]
 class GrowingLog:
     """Reader of the messages added to a log since the last look at it; only whole chunks are read.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Attributes
-    ----------
-    path : Path
-    head : Head
-        Its scene, versions and settings.
-    finished : bool
-        Whether its writer has finished it.
-
-    Raises
-    ------
-    InputError
-        If it is no log, or, from `read` too, is damaged.
+    Raises InputError if it is no log, or, from `read` too, is damaged.
     """
 
     def __init__(self, path: str | Path):
@@ -51,8 +36,8 @@ class GrowingLog:
         self._begin()
 
     def _begin(self) -> None:
-        self.head: Head = read_head(self.path)
-        self.finished = False
+        self.head: Head = read_head(self.path)  # Its scene, versions and settings
+        self.finished = False  # Whether its writer has finished it
         self._place = len(MAGIC)
         self._definitions = Definitions()
         self._file_number = os.stat(self.path).st_ino

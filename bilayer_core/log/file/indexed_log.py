@@ -25,28 +25,15 @@ MOST_WAITING = 500_000_000
 
 @dataclass(frozen=True)
 class Channel:
-    """Topic in a log: its type, encoding, quality of service and number of messages.
+    """Topic in a log: its type, encoding, quality of service and number of messages."""
 
-    Attributes
-    ----------
-    number : int
-        Within the log.
-    topic, type : str
-        The type is a ROS type such as ``std_msgs/msg/Float64`` where the log holds ROS messages.
-    encoding : str
-        Of messages; ``cdr`` for those of ROS 2.
-    qos : str
-        What the log says of the quality of service, YAML in the form of rosbag2; empty where it says nothing.
-    count : int or None
-        Messages; None where the log does not say.
-    """
-
-    number: int
+    number: int  # Within the log
     topic: str
     type: str
-    encoding: str
-    qos: str
-    count: int | None
+    """`topic`, `type`: the type is a ROS type such as ``std_msgs/msg/Float64`` where the log holds ROS messages."""
+    encoding: str  # Of messages; ``cdr`` for those of ROS 2
+    qos: str  # What the log says of the quality of service, YAML in the form of rosbag2; empty where it says nothing
+    count: int | None  # Messages; None where the log does not say
 
 
 @dataclass(frozen=True)

@@ -16,16 +16,8 @@ MOST_NESTED = 100_000
 def read_json(text: str, what: str) -> Any:
     """Return the value of a JSON text.
 
-    Parameters
-    ----------
-    text : str
-    what : str
-        What it is, with its file or key, for the error.
-
-    Raises
-    ------
-    InputError
-        If it is no JSON, nested too deeply, or has more than `MOST_VALUES` values or `MOST_NESTED` lists and mappings.
+    `what`: its name for the error, with its file or key. Raises InputError if it is no JSON, nested too deeply, or
+    has more than `MOST_VALUES` values or `MOST_NESTED` lists and mappings.
     """
     if text.count(",") > MOST_VALUES or text.count("[") + text.count("{") > MOST_NESTED:
         raise InputError(f"{what}: has more values than are read, {MOST_VALUES:,} in {MOST_NESTED:,} lists")

@@ -22,18 +22,8 @@ _log = logging.getLogger(__name__)
 def open_alone(path: Path, force: bool) -> BinaryIO:
     """Open a file for writing that no other program writes; it is empty then.
 
-    Parameters
-    ----------
-    path : Path
-    force : bool
-        Replace what is there.
-
-    Raises
-    ------
-    InputError
-        If another program is writing the file, which stays as it is.
-    OSError
-        If it cannot be opened, or is there without `force`.
+    `force`: replace what is there. Raises InputError if another program is writing the file, which stays as it is.
+    Raises OSError if it cannot be opened, or is there without `force`.
     """
     with ExitStack() as refused:
         file = refused.enter_context(open(path, "wb" if force else "xb", opener=_without_emptying))
@@ -72,10 +62,7 @@ def _lock(file: BinaryIO, path: Path) -> None:
 def try_lock(file: BinaryIO) -> bool | None:
     """Lock an open file until it is closed, without waiting.
 
-    Returns
-    -------
-    bool or None
-        Whether this process has the lock now; None if the file system or the operating system has no locks.
+    Returns whether this process has the lock now; None if the file system or the operating system has no locks.
     """
     if fcntl is None:
         return None

@@ -47,10 +47,7 @@ class Head:
 def is_log(path: Path) -> bool:
     """Return whether a file is a log of a run, whole or not, by any of the metadata that only these have.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, or is no MCAP file.
+    Raises InputError if it cannot be read, or is no MCAP file.
     """
     return any(_OWN[name] in values for name, values in metadata_records(path, _OWN))
 
@@ -58,10 +55,7 @@ def is_log(path: Path) -> bool:
 def read_head(path: Path) -> Head:
     """Return the scene, description, versions and settings: all that comes before the first chunk.
 
-    Raises
-    ------
-    InputError
-        If the file is no log, with what can be done with a bag of ``ros2 bag record``, or is damaged.
+    Raises InputError if the file is no log, with what can be done with a bag of ``ros2 bag record``, or is damaged.
     """
     if path.is_dir() or not is_log(path):
         raise InputError(

@@ -37,10 +37,7 @@ def open_log(path: Path) -> Iterator[BinaryIO]:
 def metadata_records(path: Path, wanted: Collection[str]) -> Iterator[tuple[str, dict[str, str]]]:
     """Yield the name and the content of each metadata record of some names, in the order of the file.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, or is no MCAP file, or is damaged.
+    Raises InputError if it cannot be read, or is no MCAP file, or is damaged.
     """
     with open_log(path) as file:
         for place in walk(file):

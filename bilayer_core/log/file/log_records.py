@@ -66,20 +66,11 @@ class DamagedChunk(ValueError):
 
 @dataclass(frozen=True)
 class Place:
-    """Where a record is.
-
-    Attributes
-    ----------
-    opcode : int
-    offset : int
-        Of its content, from the beginning of the file [bytes].
-    length : int
-        Of its content [bytes].
-    """
+    """Where a record is."""
 
     opcode: int
-    offset: int
-    length: int
+    offset: int  # Of its content, from the beginning of the file [bytes]
+    length: int  # Of its content [bytes]
 
     @property
     def begin(self) -> int:
@@ -106,13 +97,7 @@ def walk(file: BinaryIO, begin: int = len(MAGIC)) -> Iterator[Place]:
 
 
 def content(file: BinaryIO, place: Place) -> bytes:
-    """Return the content of a record.
-
-    Raises
-    ------
-    DamagedChunk
-        If it is longer than a record of its kind may be.
-    """
+    """Return the content of a record. Raises DamagedChunk if it is longer than a record of its kind may be."""
     most = _LARGEST.get(place.opcode, LARGEST_RECORD)
     if place.length > most:
         size = f"{place.length / 1e6:.3g} MB, and at most {most / 1e6:.3g} MB are read"
@@ -136,10 +121,7 @@ def parse(kind: type, data: bytes):
 def read_metadata(data: bytes, wanted: Collection[str] | None = None) -> tuple[str, dict[str, str]]:
     """Return name and values of a metadata record from its content; without values if its name is not `wanted`.
 
-    Raises
-    ------
-    DamagedChunk
-        If it has not the form of one, or more than `MOST_ENTRIES` keys.
+    Raises DamagedChunk if it has not the form of one, or more than `MOST_ENTRIES` keys.
     """
     try:
         name, place = _text(data, 0)
@@ -181,10 +163,7 @@ def read_chunk(file: BinaryIO, place: Place) -> bytes:
 def unpacked(data: bytes) -> bytes:
     """Return the unpacked data of a chunk from the content of its record, checked against its checksum.
 
-    Raises
-    ------
-    DamagedChunk
-        If it cannot be unpacked, is not what was written, or is larger than `LARGEST_CHUNK`.
+    Raises DamagedChunk if it cannot be unpacked, is not what was written, or is larger than `LARGEST_CHUNK`.
     """
     try:
         _, _, size, checksum, length = CHUNK_HEAD.unpack_from(data)
@@ -271,10 +250,7 @@ class Definitions:
     def take(self, opcode: int, data: bytes) -> None:
         """Take a schema or a channel from the content of its record.
 
-        Raises
-        ------
-        DamagedChunk
-            If it cannot be parsed, or all of them are larger than `MOST_DEFINITIONS`.
+        Raises DamagedChunk if it cannot be parsed, or all of them are larger than `MOST_DEFINITIONS`.
         """
         from mcap.records import Channel, Schema
 

@@ -100,10 +100,7 @@ class Summary:
     def chunks(self) -> Iterator[tuple[Place, int]]:
         """Yield each chunk in the order of the file, with the length of the indexes that follow it [bytes].
 
-        Raises
-        ------
-        DamagedChunk
-            If chunks lie over each other.
+        Raises DamagedChunk if chunks lie over each other.
         """
         end = 0
         for chunk in np.argsort(np.asarray(self._begins), kind="stable").tolist():

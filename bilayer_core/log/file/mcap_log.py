@@ -18,6 +18,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from bilayer_core.errors import InputError, OutputError, SimulationError
+from bilayer_core.jit.library import origin
 from bilayer_core.log.file.backlog import Backlog
 from bilayer_core.log.file.chain import CHAIN, END, Chain, place_in_state
 from bilayer_core.log.file.lock import open_alone, refuse_file_in_use
@@ -318,7 +319,6 @@ class _LogFile:
         import mcap
         from mcap.writer import CompressionType, Writer
 
-        from bilayer_core.jit.library import origin
         from bilayer_core.observed.system import machine, versions
 
         self._gate = gate

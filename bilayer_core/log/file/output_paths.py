@@ -53,17 +53,8 @@ def draft_of(path: str | Path, force: bool) -> Iterator[Path]:
     If the block raises, also where a signal ends the program, the draft is removed and what `path` held stays. Devices,
     pipes, and files in directories that cannot be written to, are their own drafts.
 
-    Parameters
-    ----------
-    path : str or Path
-        As `check_output_path` has returned it.
-    force : bool
-        Replace what is there; without it, a file that another program has made meanwhile is kept.
-
-    Raises
-    ------
-    OutputError
-        If an OSError says that the file cannot be written.
+    `path`: as `check_output_path` has returned it. `force`: replace what is there; without it, a file that another
+    program has made meanwhile is kept. Raises OutputError if an OSError says that the file cannot be written.
     """
     path = Path(path)
     target = path.resolve()  # a link stays one

@@ -37,15 +37,7 @@ _NAME = re.compile(re.escape(PREFIX) + r"([0-9a-f]{8})-[a-z0-9_]{8}")
 def private_directory(parent: str | Path | None = None) -> Iterator[Path]:
     """Make an empty directory that only this user can enter, and remove it with its content when the block ends.
 
-    Parameters
-    ----------
-    parent : str or Path, optional
-        By default the directory of the system for temporary files.
-
-    Raises
-    ------
-    OSError
-        If it cannot be made.
+    `parent`: by default the directory of the system for temporary files. Raises OSError if it cannot be made.
     """
     parent = tempfile.gettempdir() if parent is None else parent
     _remove_leftovers(parent)

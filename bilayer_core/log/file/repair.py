@@ -68,29 +68,17 @@ _WINDOW = 1 << 20
 
 @dataclass
 class Repaired:
-    """Result of a repair.
+    """Result of a repair."""
 
-    Attributes
-    ----------
-    whole : bool
-        Nothing was wrong: the file was copied as it is.
-    chunks, messages : int
-        That were kept.
-    attachments, metadata : int
-        Likewise.
-    last_time : float or None
-        Of the last message that was kept [s].
-    lost : list of str
-        What was not, and where it was.
-    """
-
-    whole: bool = False
+    whole: bool = False  # Nothing was wrong: the file was copied as it is
     chunks: int = 0
     messages: int = 0
+    """`chunks`, `messages`: that were kept."""
     attachments: int = 0
     metadata: int = 0
-    last_time: float | None = None
-    lost: list[str] = field(default_factory=list)
+    """`attachments`, `metadata`: likewise."""
+    last_time: float | None = None  # Of the last message that was kept [s]
+    lost: list[str] = field(default_factory=list)  # What was not, and where it was
 
     @property
     def kept(self) -> str:
@@ -108,18 +96,8 @@ class Repaired:
 def repair(path: str | Path, new: str | Path, force: bool = False) -> Repaired:
     """Write what can be read of a log as one that is whole; a log that is whole is copied.
 
-    Parameters
-    ----------
-    path, new : str or Path
-    force : bool
-        Replace `new` if it is there.
-
-    Raises
-    ------
-    InputError
-        If `path` is no MCAP file, or `new` is there or cannot be written.
-    OutputError
-        If writing fails; nothing is left then.
+    `force`: replace `new` if it is there. Raises InputError if `path` is no MCAP file, or `new` is there or cannot be
+    written. Raises OutputError if writing fails; nothing is left then.
     """
     path, new = Path(path), Path(new)
     if new.exists() and path.exists() and new.samefile(path):

@@ -146,20 +146,8 @@ def decode(data: bytes | bytearray | memoryview, field: tuple[int, np.dtype, tup
 def decoded(path: str | Path, topic: str, time: int, data: bytes, decode: Callable[[bytes], Value]) -> Value:
     """Return what a message in a file holds.
 
-    Parameters
-    ----------
-    path : str or Path
-    topic : str
-    time : int
-        Of the message [ns].
-    data : bytes
-    decode : callable
-        Returns the value of `data`; raises ValueError, IndexError or struct.error if that has not the form of its type.
-
-    Raises
-    ------
-    InputError
-        If it has not.
+    `time`: of the message [ns]. `decode`: returns the value of `data`; raises ValueError, IndexError or struct.error if
+    that has not the form of its type. Raises InputError if it has not.
     """
     try:
         return decode(data)

@@ -56,10 +56,7 @@ def to_text(description: Description) -> dict[str, str]:
 def from_text(attributes: Mapping[str, str], scene_text: str) -> Description:
     """Return the description of which `attributes` is `to_text`.
 
-    Raises
-    ------
-    InputError
-        With the key, if it has other types, sizes or names than a scene could have.
+    Raises InputError with the key, if it has other types, sizes or names than a scene could have.
     """
     known = {name: text for name, text in attributes.items() if name in DescriptionPart.model_fields}
     return _described({name: read_json(text, f"description: {name}") for name, text in known.items()}, scene_text)
@@ -98,10 +95,7 @@ def to_json(description: Description) -> str:
 def from_json(text: str) -> Description:
     """Return the description from its text as written by `to_json`.
 
-    Raises
-    ------
-    InputError
-        With the key, if the text is not a description, or is one of another version.
+    Raises InputError with the key, if the text is not a description, or is one of another version.
     """
     values = read_json(text, "the description of a run")
     if not (isinstance(values, dict) and isinstance(values.get("scene_text"), str)):

@@ -133,21 +133,12 @@ class FrameEncoder:
 
     Not safe to share between threads: each takes its own.
 
-    Parameters
-    ----------
-    description : Description
-        Of the model whose frames come.
-    tf : str
-        What the names of frames on ``/tf`` begin with; empty: there is no such topic.
-
-    Attributes
-    ----------
-    topics : tuple of TopicSpec
-        What `encode` understands, see `output_topics`.
+    `description`: of the model whose frames come. `tf`: what the names of frames on ``/tf`` begin with; empty: there is
+    no such topic.
     """
 
     def __init__(self, description: Description, tf: str = ""):
-        self.topics = output_topics(description, bool(tf))
+        self.topics = output_topics(description, bool(tf))  # What `encode` understands, see `output_topics`
         self._node_frames = NodeFrames(description)
         self._energy: tuple[tuple[str, ...], SmallMessage] = ((), SmallMessage(multi_array_template(())))
         self._markers = MarkerEncoder(description, self._node_frames)
@@ -218,14 +209,7 @@ class FrameEncoder:
 
 
 class SmallMessage:
-    """Encoder of a message with stamps and at most one array.
-
-    Parameters
-    ----------
-    template : Template
-    values : callable, optional
-        Takes that array from a frame.
-    """
+    """Encoder of a message with stamps and at most one array. `values`: takes that array from a frame."""
 
     def __init__(self, template: Template, values: Callable[[Frame], np.ndarray | list[float]] | None = None):
         self.template, self.values = template, values

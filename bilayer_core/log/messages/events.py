@@ -44,12 +44,7 @@ class Event:
 
 
 class EventDetector:
-    """Finds events in frames that come one after the other.
-
-    Parameters
-    ----------
-    description : Description
-    """
+    """Finds events in frames that come one after the other."""
 
     def __init__(self, description: Description):
         rods = {strand.rod for strand in description.strands}

@@ -70,17 +70,8 @@ def force_arrows(origins: np.ndarray, forces: np.ndarray, unit: float | np.ndarr
 
     Each arrow has a shaft and two barbs; all points of a zero force are at its origin.
 
-    Parameters
-    ----------
-    origins, forces : ndarray
-        [m, N], shape (arrows, 3).
-    unit : float or ndarray
-        Force from which arrows grow [N], of all or of each, shape (arrows,).
-
-    Returns
-    -------
-    ndarray
-        Pairs of points [m], shape (6 arrows, 3).
+    `origins`, `forces`: [m, N], shape (arrows, 3). `unit`: force from which arrows grow [N], of all or of each, shape
+    (arrows,). Returns pairs of points [m], shape (6 arrows, 3).
     """
     points = np.empty((len(forces), 6, 3))
     arrows = ArrowArrays(
@@ -133,16 +124,7 @@ def deleting_all_first(message: bytes) -> bytes:
 class MarkerEncoder:
     """Encodes frames as ``visualization_msgs/MarkerArray``; the only marker of changing size, arrows, comes last.
 
-    Parameters
-    ----------
-    description : Description
-    node_frames : NodeFrames
-        Of the same model.
-
-    Attributes
-    ----------
-    template : Template
-        The message without contact forces.
+    `node_frames`: of the same model.
     """
 
     def __init__(self, description: Description, node_frames: NodeFrames):
@@ -198,7 +180,7 @@ class MarkerEncoder:
         self._arrows_start = len(template)
         template.put("<u4", 0)  # colours: none, the marker's own counts
         _tail(template)
-        self.template = template
+        self.template = template  # The message without contact forces
 
         views = template.views()
         self._arrow_action, self._arrow_count = views["arrows"], views["arrow_count"]

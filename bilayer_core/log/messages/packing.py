@@ -19,13 +19,7 @@ def pack(parts: Sequence[tuple[str, bytes]]) -> tuple[str, bytes]:
 
 
 def unpack(label: str, data: bytes) -> list[tuple[str, bytes]]:
-    """Return the messages of a frame with their topics.
-
-    Raises
-    ------
-    InputError
-        If the label does not fit the data.
-    """
+    """Return the messages of a frame with their topics. Raises InputError if the label does not fit the data."""
     parts, place = [], 0
     for part in label.split():
         topic, _, length = part.rpartition(":")

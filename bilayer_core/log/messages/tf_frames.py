@@ -25,18 +25,8 @@ ENDS = ("start", "end")
 class TfEncoder:
     """Encodes frames as such messages.
 
-    Parameters
-    ----------
-    description : Description
-    nodes : NodeFrames
-        Of the same description.
-    prefix : str
-        What names begin with, such as ``bilayer_sim``; a leading slash is left out, which tf2 does not allow.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Of all frames.
+    `nodes`: of the same description. `prefix`: what names begin with, such as ``bilayer_sim``; a leading slash is left
+    out, which tf2 does not allow.
     """
 
     def __init__(self, description: Description, nodes: NodeFrames, prefix: str):
@@ -45,7 +35,7 @@ class TfEncoder:
         self._rows = np.array([row for rows in ends.values() for row in rows], dtype=np.intp)
         names = [body.name for body in description.bodies]
         names += [f"{rod}/{end}" for rod in ends for end in ENDS]
-        self.names = tuple(f"{prefix.strip('/')}/{name}" for name in names)
+        self.names = tuple(f"{prefix.strip('/')}/{name}" for name in names)  # Of all frames
         self._template = Template()
         self._template.put("<u4", len(self.names))
         for k, name in enumerate(self.names):

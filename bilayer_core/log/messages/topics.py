@@ -32,24 +32,12 @@ class Rate(Enum):
 
 @dataclass(frozen=True)
 class TopicSpec:
-    """One topic.
+    """One topic."""
 
-    Attributes
-    ----------
-    name : str
-        Relative to the node's namespace, or absolute with a leading slash.
-    type : str
-        ROS type, for example ``"geometry_msgs/msg/PoseArray"``.
-    rate : Rate
-        How often it is sent.
-    depth : int
-        History depth of its quality of service; all topics are reliable and volatile.
-    """
-
-    name: str
-    type: str
-    rate: Rate
-    depth: int = 10
+    name: str  # Relative to the node's namespace, or absolute with a leading slash
+    type: str  # ROS type, for example ``"geometry_msgs/msg/PoseArray"``
+    rate: Rate  # How often it is sent
+    depth: int = 10  # History depth of its quality of service; all topics are reliable and volatile
 
     def full_name(self, namespace: str = LOG_NAMESPACE) -> str:
         """Return the absolute name under `namespace`."""
@@ -178,12 +166,7 @@ def input_topics(description: Description) -> tuple[TopicSpec, ...]:
 class DisplayGate:
     """Tells which frames carry the topics of `Rate.DISPLAY`: the first one in each period of their rate.
 
-    Parameters
-    ----------
-    rate : float
-        Of frames [Hz].
-    display_rate : float
-        Wished rate of those topics [Hz]; they cannot come more often than frames.
+    `rate`: of frames [Hz]. `display_rate`: wished rate of those topics [Hz]; they cannot come more often than frames.
     """
 
     # Frames come at multiples of the time step, up to rounding; in periods.

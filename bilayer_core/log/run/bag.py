@@ -27,34 +27,17 @@ MOST_LISTED = 8
 
 @dataclass(frozen=True)
 class BagRun:
-    """A run that a bag holds.
+    """A run that a bag holds."""
 
-    Attributes
-    ----------
-    node : str
-        Full name of the node.
-    number : int
-        Of the run, from 1: a reset of the node begins another one.
-    of : int
-        How many of them there are.
-    start_time, last_time : float
-        Simulated [s].
-    described : bool
-        Whether the bag holds the node's description.
-    stamped : bool
-        Whether it holds messages with stamps; otherwise times are those since the first message.
-    certain : bool
-        Whether messages without stamps have the times of their frames for certain.
-    """
-
-    node: str
-    number: int
-    of: int
+    node: str  # Full name of the node
+    number: int  # Of the run, from 1: a reset of the node begins another one
+    of: int  # How many of them there are
     start_time: float
     last_time: float
-    described: bool
-    stamped: bool
-    certain: bool
+    """`start_time`, `last_time`: simulated [s]."""
+    described: bool  # Whether the bag holds the node's description
+    stamped: bool  # Whether it holds messages with stamps; otherwise times are those since the first message
+    certain: bool  # Whether messages without stamps have the times of their frames for certain
 
     @property
     def address(self) -> str:
@@ -76,23 +59,8 @@ def split_address(path: str | Path) -> tuple[Path, str, int]:
 class Bag:
     """Runs of this package's nodes in a bag.
 
-    Parameters
-    ----------
-    path : Path
-        Of an MCAP file, or of the bag's directory.
-    node : str
-        The full name of the only node that counts; empty: all.
-
-    Attributes
-    ----------
-    node : str
-    files : BagFiles
-    runs : list of BagRun
-
-    Raises
-    ------
-    InputError
-        If it is no bag in MCAP, or is damaged.
+    `path`: of an MCAP file, or of the bag's directory. `node`: the full name of the only node that counts; empty: all.
+    Raises InputError if it is no bag in MCAP, or is damaged.
     """
 
     def __init__(self, path: Path, node: str = ""):
@@ -131,20 +99,10 @@ class Bag:
 
 
 class BaggedRun:
-    """The messages of one run by simulated time: what `LogSource` asks of a file.
-
-    Attributes
-    ----------
-    namespace : str
-        Full name of the node.
-    topics : dict
-        Full name of each topic -> ROS type.
-    description : Description
-        The node's own; without one, what the topics say.
-    """
+    """The messages of one run by simulated time: what `LogSource` asks of a file."""
 
     def __init__(self, files: BagFiles, held: NodeTracks, run: BagRun):
-        self.namespace = run.node
+        self.namespace = run.node  # Full name of the node
         self._files = files
         number = run.number - 1
         self._kept: dict[str, np.ndarray] = {}
@@ -154,12 +112,12 @@ class BaggedRun:
             if kept.any():
                 self._kept[f"{run.node}/{name}"] = kept
                 self._stamps[f"{run.node}/{name}"] = track.stamps[kept]
-        self.topics = {topic: files.topics[topic] for topic in self._kept}
+        self.topics = {topic: files.topics[topic] for topic in self._kept}  # Full name of each topic -> ROS type
         text = held.description_of(number)
         place = str(files.path)
         self.description = (
             _description(f"{place}: {run.node}/description", text) if text else _unknown(place, held.tracks, run.node)
-        )
+        )  # The node's own; without one, what the topics say
 
     def times(self, topic: str) -> np.ndarray:
         """Return the simulated time of each message of a topic [ns], in the order of the files."""
@@ -186,10 +144,7 @@ class BaggedRun:
 def choose_run(bag: Bag, number: int = 0) -> BagRun:
     """Return the only run of a bag, or that of a number.
 
-    Raises
-    ------
-    InputError
-        If there is none, or more than one, with what to say.
+    Raises InputError if there is none, or more than one, with what to say.
     """
     path = bag.files.path
     runs = [run for run in bag.runs if number in (0, run.number)]

@@ -12,13 +12,7 @@ Array = np.ndarray
 
 
 class FrameValues:
-    """Finds the values of quantities in frames of a run.
-
-    Parameters
-    ----------
-    description : Description
-        Of the run.
-    """
+    """Finds the values of quantities in frames of a run. `description`: of the run."""
 
     def __init__(self, description: Description) -> None:
         self._node_frames = NodeFrames(description)
@@ -26,32 +20,13 @@ class FrameValues:
         self._joined: dict[str, Array] = {}
 
     def of(self, entry: Entry, frame: Frame) -> Array:
-        """Return a copy of a quantity.
-
-        Parameters
-        ----------
-        entry : Entry
-        frame : Frame
-
-        Returns
-        -------
-        ndarray
-        """
+        """Return a copy of a quantity."""
         return entry.derived(self.picked(entry, frame)[None])[0]
 
     def picked(self, entry: Entry, frame: Frame, precision: type = float) -> Array:
         """Return a copy of the numbers in a frame from which a quantity is derived; most are the quantity.
 
-        Parameters
-        ----------
-        entry : Entry
-        frame : Frame
-        precision : type
-            Of the copy.
-
-        Returns
-        -------
-        ndarray
+        `precision`: of the copy.
         """
         if entry.attribute == "energy":
             return np.array(frame.energy[str(entry.index)])

@@ -107,12 +107,7 @@ def read_info(path: str | Path) -> LogInfo:
     """Return the contents of a log, a bag or any other MCAP file.
 
     Those of a log come from its index or, if it was cut off, from reading it through; a bag and any other file are read
-    through once.
-
-    Raises
-    ------
-    InputError
-        If it is no MCAP file, or is damaged.
+    through once. Raises InputError if it is no MCAP file, or is damaged.
     """
     path, node, number = split_address(path)
     if not names_log(path, node, number):

@@ -76,26 +76,8 @@ class _Queue:
 class LogSource:
     """The quantities of a log.
 
-    Parameters
-    ----------
-    path : str or Path
-        Of a log or a bag, see `open_run`.
-    head : Head, optional
-    file : MessageSource, optional
-        If they are read already.
-
-    Attributes
-    ----------
-    description : Description
-    entries : dict
-        Name -> `Entry` of each quantity.
-    lacks : tuple of str
-        Topics with quantities that the log does not hold.
-
-    Raises
-    ------
-    InputError
-        If the file is no log, or is damaged; that a chunk is damaged is told when it is read.
+    `path`: of a log or a bag, see `open_run`. `head`, `file`: if they are read already. Raises InputError if the file
+    is no log, or is damaged; that a chunk is damaged is told when it is read.
     """
 
     def __init__(self, path: str | Path, head: Head | None = None, file: MessageSource | None = None):
@@ -117,14 +99,14 @@ class LogSource:
             for group, names in groups.items()
             for name in names
             if name not in self._held[group] and (self._held[group] or self._full(name) not in self._file.topics)
-        )
+        )  # Topics with quantities that the log does not hold
         terms, figures = (self._first(name)[0] if counts[name] else () for name in ("energy", "solver"))
         lacking = set(self.lacks)
         self.entries = {
             entry.name: entry
             for entry in entries(self.description, terms, figures)
             if self._full(entry.topic) not in lacking
-        }
+        }  # Name -> `Entry` of each quantity
         self._most_memory = max(LEAST_MEMORY, MOST_EXPANSION * size_of(split_address(path)[0]))
         self._memory = 0
 
@@ -196,11 +178,7 @@ class LogSource:
         """Yield values of quantities that come at one rate, in blocks of rows: where they are in the times, and by
         name.
 
-        Parameters
-        ----------
-        wanted : iterable of Entry
-        most : int
-            About as much is read at once [bytes].
+        `most`: about as much is read at once [bytes].
         """
         queues: dict[str, _Queue] = {}
         for entry in wanted:

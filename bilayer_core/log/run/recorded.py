@@ -19,20 +19,11 @@ if TYPE_CHECKING:
 
 
 class Recorded(ABC):
-    """Quantities over time by name, with units; see `log.run.quantities` for the names.
-
-    Attributes
-    ----------
-    description : Description
-    times : ndarray
-        Of all but shapes of rods [s], shape (frames,).
-    shape_times : ndarray
-        Of shapes of rods [s], shape (shapes,).
-    """
+    """Quantities over time by name, with units; see `log.run.quantities` for the names."""
 
     description: Description
-    times: np.ndarray
-    shape_times: np.ndarray
+    times: np.ndarray  # Of all but shapes of rods [s], shape (frames,)
+    shape_times: np.ndarray  # Of shapes of rods [s], shape (shapes,)
 
     @property
     @abstractmethod

@@ -146,10 +146,4 @@ class Recorder(Recorded):
         return found
 
     def entries(self) -> dict[str, Entry]:
-        """Return the entry of each quantity, by name: all that is known of it besides its values.
-
-        Returns
-        -------
-        dict of str to Entry
-        """
         return dict(self._entries)

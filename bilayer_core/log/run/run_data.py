@@ -89,12 +89,6 @@ class RunData(Recorded):
         return ()
 
     def entries(self) -> dict[str, Entry]:
-        """Return the entry of each quantity, by name: all that is known of it besides its values.
-
-        Returns
-        -------
-        dict of str to Entry
-        """
         return {entry.name: entry for entry in entries(self.description, self.energy, self.solver)}
 
     def __repr__(self) -> str:

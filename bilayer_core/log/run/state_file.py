@@ -43,10 +43,8 @@ def read_saved_state(path: str | Path, description: Description, time: float | N
     """Return the flat state from a file of `write_state`, or from an MCAP log the last one, or the last at or before a
     time [s].
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, its state has other parts than those of `description`, or it has none at that time.
+    Raises InputError if the file cannot be read, its state has other parts than those of `description`, or it has none
+    at that time.
     """
     path = Path(path)
     if path.suffix.lower() == LOG_SUFFIX:

@@ -21,10 +21,7 @@ PATTERN = set("*?[")
 def chosen(source: LogSource, names: Sequence[str]) -> list[Entry]:
     """Return the quantities of some names, such as ``com`` or ``energy/*``; all of a log by default.
 
-    Raises
-    ------
-    InputError
-        If there is none of a name, with those near it.
+    Raises InputError if there is none of a name, with those near it.
     """
     if not names:
         return list(source.entries.values())
@@ -37,12 +34,7 @@ def chosen(source: LogSource, names: Sequence[str]) -> list[Entry]:
 def chosen_names(known: Iterable[str], name: str, why_not: Callable[[str], str | None]) -> list[str]:
     """Return the names that match a pattern such as ``energy/*``, or the name itself.
 
-    Parameters
-    ----------
-    known : iterable of str
-    name : str
-    why_not : callable
-        Why a name that other logs have is not known here, if that is so.
+    `why_not`: why a name that other logs have is not known here, if that is so.
     """
     known = list(known)
     name = present_name(name, known)
@@ -113,13 +105,7 @@ class Table:
 
 
 def one_table(entries: list[Entry], path: str) -> Table:
-    """Return all quantities as one table.
-
-    Raises
-    ------
-    InputError
-        If they have no rows in common.
-    """
+    """Return all quantities as one table. Raises InputError if they have no rows in common."""
     kinds = {strand_of(entry) for entry in entries}
     if len(kinds) > 1:
         told = ", ".join(sorted(kind and f"rod/{kind}/…" or "those over time alone" for kind in kinds))

@@ -47,10 +47,6 @@ class ArrivingRun:
 
     A frame is whole when all topics of its rate have come with its time. What comes without the others, as of a
     transport that loses some, is left out; so is what comes again, and what is older than what was given already.
-
-    Parameters
-    ----------
-    description : Description
     """
 
     def __init__(self, description: Description):

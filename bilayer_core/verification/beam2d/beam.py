@@ -74,10 +74,7 @@ class PlanarBeam:
     def solve_static(self) -> None:
         """Go to an equilibrium under the present eigenstrain and gravity.
 
-        Raises
-        ------
-        SimulationError
-            If none is found; the beam is unchanged then.
+        Raises SimulationError if none is found; the beam is unchanged then.
         """
         before, length = self.position, FIRST_LENGTH
         while length <= LAST_LENGTH:
@@ -92,10 +89,7 @@ class PlanarBeam:
     def step(self, dt: float) -> None:
         """Advance by one step of implicit Euler [s].
 
-        Raises
-        ------
-        SimulationError
-            If Newton's method does not converge; the beam is unchanged then.
+        Raises SimulationError if Newton's method does not converge; the beam is unchanged then.
         """
         end = self._minimum(self.position + dt * self.velocity, dt)
         self.velocity = (end - self.position) / dt

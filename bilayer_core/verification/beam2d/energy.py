@@ -39,39 +39,21 @@ class Section:
 
 @dataclass(frozen=True)
 class Strains:
-    """Strains at one shape, with what their derivatives need.
+    """Strains at one shape, with what their derivatives need."""
 
-    Attributes
-    ----------
-    length : Array
-        |e| [m], shape (n_edge,).
-    tangent, normal : Array
-        Unit, shape (n_edge, 2); the normal is the tangent turned by a quarter to the left.
-    axial : Array
-        ε, shape (n_edge,).
-    bend : Array
-        χ Δl = 2 tan(φ/2), shape (n_bend,).
-    """
-
-    length: Array
+    length: Array  # |e| [m], shape (n_edge,)
     tangent: Array
     normal: Array
-    axial: Array
-    bend: Array
+    """`tangent`, `normal`: unit, shape (n_edge, 2); the normal is the tangent turned by a quarter to the left."""
+    axial: Array  # ε, shape (n_edge,)
+    bend: Array  # χ Δl = 2 tan(φ/2), shape (n_bend,)
 
 
 class BeamEnergy:
     """Elastic energy of nodes in a plane, its gradient and its Hessian.
 
-    Parameters
-    ----------
-    section : Section
-    edge_length : float
-        |ē| [m].
-    node_count : int
-    wall : Array or None
-        Unit direction that a clamp at the first node fixes, shape (2,); the wall stands at the node, with a bending
-        element of half an edge. None for a free end.
+    `edge_length`: |ē| [m]. `wall`: unit direction that a clamp at the first node fixes, shape (2,); the wall stands at
+    the node, with a bending element of half an edge. None for a free end.
     """
 
     def __init__(self, section: Section, edge_length: float, node_count: int, wall: Array | None):
@@ -123,12 +105,7 @@ class BeamEnergy:
     def value(self, position: Array, force: Array, moment: Array) -> float:
         """Return E [J].
 
-        Parameters
-        ----------
-        position : Array
-            [m], shape (n_node, 2).
-        force, moment : Array
-            N [N] and M [N m] of each edge, shape (n_edge,).
+        `position`: [m], shape (n_node, 2). `force`, `moment`: N [N] and M [N m] of each edge, shape (n_edge,).
         """
         s, at = self.section, self.strains(position)
         stretching = (0.5 * s.axial * at.axial - force) @ at.axial * self.edge_length

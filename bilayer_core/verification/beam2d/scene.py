@@ -22,10 +22,7 @@ IN_PLANE = 1e-12  # of gravity's size: what its part across the plane may be
 def beam_of(scene: SceneConfig) -> PlanarBeam:
     """Return the beam of a scene, straight and without eigenstrain.
 
-    Raises
-    ------
-    SceneError
-        If the scene has anything that the beam cannot represent; the message names it.
+    Raises SceneError if the scene has anything that the beam cannot represent; the message names it.
     """
     rod = _only_rod(scene)
     halves = [sections(rod, layer, scene.materials[layer.material], np.zeros(1)) for layer in rod.layers]
@@ -56,10 +53,7 @@ def beam_of(scene: SceneConfig) -> PlanarBeam:
 def set_stimuli(beam: PlanarBeam, scene: SceneConfig, values: dict[str, float]) -> None:
     """Let the layers of a scene's beam follow settled stimuli, each channel's value given in its unit.
 
-    Raises
-    ------
-    InputError
-        If a channel has no value, or there is no such channel.
+    Raises InputError if a channel has no value, or there is no such channel.
     """
     if values.keys() != scene.stimuli.keys():
         known = ", ".join(scene.stimuli) or "none"

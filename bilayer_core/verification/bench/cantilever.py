@@ -27,25 +27,14 @@ TIME_LIMIT = 900.0
 
 @dataclass(frozen=True)
 class Peer:
-    """A program.
+    """A program."""
 
-    Attributes
-    ----------
-    name : str
-        Of its distribution, and of its file in `peers`.
-    module : str
-        By which it is imported.
-    label : str
-        For tables and legends.
-    cases, quick_cases : tuple of (int, tuple of float)
-        Elements with the steps [s] tried on each: explicit ones near the largest stable step.
-    """
-
-    name: str
-    module: str
-    label: str
+    name: str  # Of its distribution, and of its file in `peers`
+    module: str  # By which it is imported
+    label: str  # For tables and legends
     cases: tuple[tuple[int, tuple[float, ...]], ...]
     quick_cases: tuple[tuple[int, tuple[float, ...]], ...]
+    """`cases`, `quick_cases`: elements with the steps [s] tried on each: explicit ones near the largest stable step."""
 
     @property
     def version(self) -> str | None:

@@ -40,20 +40,11 @@ class Family:
 
 @dataclass(frozen=True)
 class Configuration:
-    """One run of a family.
-
-    Attributes
-    ----------
-    family : Family
-    stations : int
-        Of the rod whose mesh is varied.
-    step : float
-        Length of fixed steps [s]; of adaptive ones their tolerance, in lengths of the longest rod.
-    """
+    """One run of a family."""
 
     family: Family
-    stations: int
-    step: float
+    stations: int  # Of the rod whose mesh is varied
+    step: float  # Length of fixed steps [s]; of adaptive ones their tolerance, in lengths of the longest rod
 
     @property
     def dt(self) -> float | None:

@@ -48,33 +48,18 @@ DIGITS = 9
 
 @dataclass(frozen=True)
 class Reference:
-    """A converged answer.
+    """A converged answer."""
 
-    Attributes
-    ----------
-    values : Array
-        As the problem's measure gives them.
-    bar : float
-        Half width of its error bar, measured as errors of runs are.
-    check : str
-        The second method.
-    difference : float
-        How far the second method is from it, measured likewise.
-    """
-
-    values: Array
-    bar: float
-    check: str
-    difference: float
+    values: Array  # As the problem's measure gives them
+    bar: float  # Half width of its error bar, measured as errors of runs are
+    check: str  # The second method
+    difference: float  # How far the second method is from it, measured likewise
 
 
 def stored(problem: Problem, model: str) -> Reference:
     """Return the reference of a problem in the stored file.
 
-    Raises
-    ------
-    InputError
-        If there is none, or the problem has changed since it was made.
+    Raises InputError if there is none, or the problem has changed since it was made.
     """
     entry = read_file().get(problem.name, {}).get(model)
     remedy = f"make it with: bilayer bench --references --only {problem.name}"
@@ -120,10 +105,7 @@ def read_file() -> dict:
 def make(problem: Problem, model: str, tell: Callable[[str], None]) -> dict:
     """Compute the reference of a problem and store it; return its entry.
 
-    Raises
-    ------
-    SimulationError
-        If one of its runs cannot be made.
+    Raises SimulationError if one of its runs cannot be made.
     """
     dimension = min(dimension for name, dimension in shapes(problem.config()) if name == model)
     values, bar, order = _limit(problem, Family(model, dimension, FIRST), tell)

@@ -26,22 +26,15 @@ LONGEST = 40.0
 
 @dataclass(frozen=True)
 class Run:
-    """Result of a run.
-
-    Attributes
-    ----------
-    outcome : str
-        ``"done"``, or why it has no result.
-    values : Array or None
-        As its problem's measure gives them.
-    cost : dict
-        CPU time [s], numbers of steps, Newton iterations, refused attempts, unknowns; 1-minute load average, where
-        the system has one.
-    """
+    """Result of a run."""
 
     outcome: str
-    values: Array | None
+    """``"done"``, or why it has no result."""
+    values: Array | None  # As its problem's measure gives them
     cost: dict[str, float | int]
+    """CPU time [s], numbers of steps, Newton iterations, refused attempts, unknowns; 1-minute load average, where
+    the system has one.
+    """
 
 
 def run(problem: Problem, configuration: Configuration, longest: float = LONGEST, timed: bool = True) -> Run:

@@ -22,52 +22,31 @@ QUICK_TOLERANCES = (1e-4,)
 
 @dataclass(frozen=True)
 class Problem:
-    """A benchmark problem.
-
-    Attributes
-    ----------
-    name, title : str
-    scene : str
-        Name of a bundled scene.
-    changes : tuple of str
-        Overrides, ``PATH=VALUE`` each.
-    rod : str
-        Whose stations are varied.
-    duration : float
-        Simulated time [s].
-    measure : Trajectory or Headline
-    levels : tuple of (int, tuple of float)
-        Meshes (stations) with the steps [s] that are tried on each, coarse to fine.
-    tolerances : tuple of float
-        Of adaptive steps; each finer mesh begins with the next of them.
-    integrators : tuple of str
-    euler_levels : tuple of (int, tuple of float)
-        More levels for implicit Euler: it wants shorter steps where motion is fast, and does with longer ones where a
-        robot is all but at rest.
-    quick_levels : tuple of (int, tuple of float)
-        Those of a quick benchmark; none: the problem is not part of it.
-    reference_levels : tuple of (int, float)
-        Stations and steps [s] of the runs whose limit is the reference: edges doubled and steps halved from each to
-        the next. Where a layer ends within the rod, a station of each of these meshes stands there: otherwise its
-        length would change with the mesh, and nothing converge.
-    second : str
-        The integrator that checks the reference.
-    """
+    """A benchmark problem."""
 
     name: str
     title: str
-    scene: str
-    changes: tuple[str, ...]
-    rod: str
-    duration: float
+    scene: str  # Name of a bundled scene
+    changes: tuple[str, ...]  # Overrides, ``PATH=VALUE`` each
+    rod: str  # Whose stations are varied
+    duration: float  # Simulated time [s]
     measure: Measure
     levels: tuple[tuple[int, tuple[float, ...]], ...]
+    """Meshes (stations) with the steps [s] that are tried on each, coarse to fine."""
     reference_levels: tuple[tuple[int, float], ...]
-    second: str = "generalised_alpha"
-    tolerances: tuple[float, ...] = TOLERANCES
+    """Stations and steps [s] of the runs whose limit is the reference: edges doubled and steps halved from each to
+    the next. Where a layer ends within the rod, a station of each of these meshes stands there: otherwise its
+    length would change with the mesh, and nothing converge.
+    """
+    second: str = "generalised_alpha"  # The integrator that checks the reference
+    tolerances: tuple[float, ...] = TOLERANCES  # Of adaptive steps; each finer mesh begins with the next of them
     integrators: tuple[str, ...] = tuple(INTEGRATORS)
     euler_levels: tuple[tuple[int, tuple[float, ...]], ...] = ()
+    """More levels for implicit Euler: it wants shorter steps where motion is fast, and does with longer ones where a
+    robot is all but at rest.
+    """
     quick_levels: tuple[tuple[int, tuple[float, ...]], ...] = ()
+    """Those of a quick benchmark; none: the problem is not part of it."""
 
     def config(self, stations: int | None = None, *more: str) -> SceneConfig:
         """Return the scene, with a mesh."""
@@ -218,13 +197,7 @@ PROBLEMS = (
 
 
 def problem(name: str) -> Problem:
-    """Return the problem of this name.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """Return the problem of this name. Raises InputError if there is none."""
     names = [each.name for each in PROBLEMS]
     if name not in names:
         raise InputError(f"{name}: no such problem{suggestion(name, names)}; there are {', '.join(names)}")

@@ -27,11 +27,6 @@ class Results:
     resume, force : bool
         What to do with a file that is there: go on with it, or begin anew.
 
-    Attributes
-    ----------
-    content : dict
-        As in the file.
-
     Raises
     ------
     InputError
@@ -41,7 +36,7 @@ class Results:
     def __init__(self, directory: Path, quick: bool, resume: bool = False, force: bool = False):
         self.path = directory / FILE_NAME
         here = machine.record()
-        self.content = {"schema": SCHEMA, "quick": quick, "machine": here, "began": machine.now()}
+        self.content = {"schema": SCHEMA, "quick": quick, "machine": here, "began": machine.now()}  # As in the file
         self.content |= {part: [] for part in PARTS}
         if not self.path.exists():
             return

@@ -20,13 +20,7 @@ def names() -> list[str]:
 
 
 def chosen_names(only: Sequence[str], quick: bool) -> list[str]:
-    """Return the names of the parts to run, in order.
-
-    Raises
-    ------
-    InputError
-        If there is no such thing.
-    """
+    """Return the names of the parts to run, in order. Raises InputError if there is no such thing."""
     known = names()
     for name in only:
         if name not in known:
@@ -54,15 +48,8 @@ def count(chosen: Sequence[str], quick: bool) -> int:
 def measure(chosen: Sequence[str], results: Results, quick: bool, progress: Callable[[str], None]) -> list[str]:
     """Do what is not among the results yet; return lines on what was left out.
 
-    Parameters
-    ----------
-    chosen : sequence of str
-        From `chosen_names`.
-    results : Results
-        Is filled, and written after every measurement.
-    quick : bool
-    progress : callable
-        Called with what is done next.
+    `chosen`: from `chosen_names`. `results`: is filled, and written after every measurement. `progress`: called with
+    what is done next.
     """
     runs = work_precision.plan(chosen_problems(chosen), quick)
     work_precision.check_references(runs)

@@ -55,11 +55,7 @@ def _run(model: str, dimension: int, nodes: int) -> dict:
 def slopes(records: list[dict], least: int = 0) -> dict[tuple[str, int], float]:
     """Return the slope of log(CPU time of a step) against log(nodes) by least squares, for every model and dimension.
 
-    Parameters
-    ----------
-    records : list of dict
-    least : int
-        Smallest number of nodes that counts.
+    `least`: the smallest number of nodes that counts.
     """
     found = {}
     for shape in dict.fromkeys((record["model"], record["dimension"]) for record in records):

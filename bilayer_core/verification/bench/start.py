@@ -44,10 +44,7 @@ def plan(quick: bool) -> list[tuple[str, str, int]]:
 def measure(results: Results, quick: bool, progress: Callable[[str], None] = lambda text: None) -> None:
     """Start a process with an empty kernel cache, then again with what it left there.
 
-    Raises
-    ------
-    SimulationError
-        If a process does not come to its first step.
+    Raises SimulationError if a process does not come to its first step.
     """
     for scene, model, dimension in plan(quick):
         identity = {"scene": scene, "model": model, "dimension": dimension}

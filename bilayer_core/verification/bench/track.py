@@ -54,24 +54,12 @@ class Track:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """The way of a point; its error: the root mean square over time of the distance from the reference, over a length.
+    """The way of a point; its error: root mean square over time of the distance from the reference, over a length."""
 
-    Attributes
-    ----------
-    point : str
-        As in `Track.points`.
-    until : float
-        End of the time that counts [s].
-    spacing : float
-        Of the instants at which a reference is kept [s]; between them it is interpolated by cubic splines.
-    length : float
-        What the distance is divided by [m].
-    """
-
-    point: str
-    until: float
-    spacing: float
-    length: float
+    point: str  # As in `Track.points`
+    until: float  # End of the time that counts [s]
+    spacing: float  # Of the instants at which a reference is kept [s]; between them it is interpolated by cubic splines
+    length: float  # What the distance is divided by [m]
 
     @property
     def error_label(self) -> str:
@@ -96,24 +84,13 @@ class Trajectory:
 
 @dataclass(frozen=True)
 class Headline:
-    """One number that says what a robot did; its error is relative to the reference.
-
-    Attributes
-    ----------
-    name, unit : str
-    factor : float
-        From SI to the unit.
-    figure : callable
-        Takes a `Track`, returns the number in SI units.
-    stops : tuple of float
-        Times at which a step must end [s].
-    """
+    """One number that says what a robot did; its error is relative to the reference."""
 
     name: str
     unit: str
-    factor: float
-    figure: Callable[[Track], float]
-    stops: tuple[float, ...] = ()
+    factor: float  # From SI to the unit
+    figure: Callable[[Track], float]  # Takes a `Track`, returns the number in SI units
+    stops: tuple[float, ...] = ()  # Times at which a step must end [s]
 
     @property
     def error_label(self) -> str:

@@ -39,13 +39,7 @@ def measure(
 ) -> None:
     """Make the runs that are not among the results yet.
 
-    Parameters
-    ----------
-    runs : iterable
-        As `plan` gives them.
-    results : Results
-    progress : callable
-        Called with what is done next, before every run.
+    `runs`: as `plan` gives them. `progress`: called with what is done next, before every run.
     """
     for problem, configuration in runs:
         identity = {"problem": problem.name, **configuration.identity()}

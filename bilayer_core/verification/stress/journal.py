@@ -45,13 +45,6 @@ class Journal:
     resume : bool
         Go on with those that are there; otherwise they are replaced.
 
-    Attributes
-    ----------
-    records : dict
-        By name of the case.
-    head : dict
-        That of the first run, if it is continued.
-
     Raises
     ------
     InputError
@@ -60,7 +53,7 @@ class Journal:
 
     def __init__(self, directory: Path, head: dict[str, object], resume: bool):
         self.path, self.head = directory / FILE, head
-        self.records: dict[str, Record] = {}
+        self.records: dict[str, Record] = {}  # By name of the case
         if resume:
             self._read()
         if not resume:
@@ -76,7 +69,7 @@ class Journal:
                 f"--resume: {self.path}: holds results of other cases ({found['cases']}, now {self.head['cases']}); "
                 "take another --out directory"
             )
-        self.head = found
+        self.head = found  # That of the first run, if it is continued
         for line in lines:
             try:
                 record = Record.from_line(line)

@@ -23,52 +23,25 @@ MOST_STEPS = 100_000
 
 @dataclass(frozen=True)
 class Rung:
-    """A case of a ladder.
+    """A case of a ladder."""
 
-    Attributes
-    ----------
-    name : str
-        That of one which takes long begins with "long".
-    overrides : tuple of str
-        Changes to the scene, ``KEY=VALUE``.
-    decide : callable or None
-        Instead of that of the ladder.
-    """
-
-    name: str
-    overrides: tuple[str, ...] = ()
-    decide: Callable[[Trial], Decision] | None = None
+    name: str  # That of one which takes long begins with "long"
+    overrides: tuple[str, ...] = ()  # Changes to the scene, ``KEY=VALUE``
+    decide: Callable[[Trial], Decision] | None = None  # Instead of that of the ladder
 
 
 @dataclass(frozen=True)
 class Torture:
-    """A torture case.
+    """A torture case."""
 
-    Attributes
-    ----------
-    number : int
-        In the list of the docs.
-    name : str
-    scene : str
-        Name of its file, without the ending: of a torture case or of a bundled scene.
-    source : str
-        Where it comes from.
-    expected : str
-        What must come out.
-    decided : str
-        The reference or inequality that decides it.
-    decide : callable
-        Runs a trial, and returns the decision. It reads from the scene what the rung has changed.
-    rungs : tuple of Rung
-    """
-
-    number: int
+    number: int  # In the list of the docs
     name: str
-    scene: str
-    source: str
-    expected: str
-    decided: str
+    scene: str  # Name of its file, without the ending: of a torture case or of a bundled scene
+    source: str  # Where it comes from
+    expected: str  # What must come out
+    decided: str  # The reference or inequality that decides it
     decide: Callable[[Trial], Decision]
+    """Runs a trial, and returns the decision. It reads from the scene what the rung has changed."""
     rungs: tuple[Rung, ...]
 
     def cases(self) -> Iterator[StressCase]:

@@ -21,23 +21,13 @@ MODELS_ALONE = (("laminate", 2), ("laminate", 3), ("two_rod", 2), ("two_rod", 3)
 
 @dataclass(frozen=True)
 class MatrixCase:
-    """One case: its name, what it sets, and how many steps it may take at most.
-
-    Attributes
-    ----------
-    name : str
-        ``axis/dt/1e-05/drop``, ``all/0123``, ``long/…``: names do not change as long as the matrix does not.
-    parameters : Parameters
-    most_steps : int
-        Accepted steps after which the case ends.
-    axis : str
-        The axis, where it is one alone.
-    """
+    """One case: its name, what it sets, and how many steps it may take at most."""
 
     name: str
+    """``axis/dt/1e-05/drop``, ``all/0123``, ``long/…``: names do not change as long as the matrix does not."""
     parameters: Parameters
-    most_steps: int = MOST_STEPS
-    axis: str = ""
+    most_steps: int = MOST_STEPS  # Accepted steps after which the case ends
+    axis: str = ""  # The axis, where it is one alone
 
 
 def matrix() -> list[MatrixCase]:

@@ -15,82 +15,40 @@ STIMULI = ("ramp", "step", "square", "noise")
 
 @dataclass(frozen=True)
 class Parameters:
-    """Settings of one case of the matrix; the defaults are easy ones.
+    """Settings of one case of the matrix; the defaults are easy ones."""
 
-    Attributes
-    ----------
-    robot : str
-        One of `ROBOTS`.
-    model, dimension, integrator : str, int, str
-    dt : float or None
-        Length of fixed steps [s]; None for adaptive ones.
-    tolerance : float
-        Of adaptive steps.
-    stations : int
-        Along each strip.
-    covered : float
-        Part of the length that the upper layer covers.
-    modulus_ratio, thickness_ratio : float
-        Upper layer over lower layer.
-    youngs_modulus : float
-        Of the lower layer [Pa].
-    slenderness : float
-        Length over thickness of a strip; a strip that is shorter than ten thicknesses is as wide as thick.
-    length : float
-        Of a strip [m]: the unit of the scene. Gravity and speeds are those of a strip of 0.1 m, scaled with it.
-    eigenstrain : float
-        Of the lower layer, at the largest stimulus.
-    stimulus : str
-        How the stimulus gets there: one of `STIMULI`.
-    turns : float
-        Natural curvature times length, over 2π.
-    speed : float
-        Of what flies, at a length of 0.1 m [m/s]; what falls does so from the height that gives it, 10 m at most.
-    friction, threshold : float
-        Coefficient, and the speed from which it acts [m/s].
-    contact_stiffness : float
-        [Pa]
-    barrier : float
-        Distance at a length of 0.1 m [m].
-    restitution : float or None
-    mass_ratio : float
-        Mass of the body over that of the strips.
-    fluid_ratio : float
-        Density of the fluid over that of the strip; 0 without a fluid.
-    added_mass : bool
-    gravity : float
-        At a length of 0.1 m [m/s²].
-    damped : bool
-        Whether the material has a retardation time.
-    """
-
-    robot: str = "beam"
+    robot: str = "beam"  # One of `ROBOTS`
     model: str = "laminate"
     dimension: int = 3
     integrator: str = "sdirk2"
-    dt: float | None = None
-    tolerance: float = 1e-4
-    stations: int = 21
-    covered: float = 1.0
+    dt: float | None = None  # Length of fixed steps [s]; None for adaptive ones
+    tolerance: float = 1e-4  # Of adaptive steps
+    stations: int = 21  # Along each strip
+    covered: float = 1.0  # Part of the length that the upper layer covers
     modulus_ratio: float = 1.0
     thickness_ratio: float = 1.0
-    youngs_modulus: float = 1e7
+    """`modulus_ratio`, `thickness_ratio`: upper layer over lower layer."""
+    youngs_modulus: float = 1e7  # Of the lower layer [Pa]
     slenderness: float = 50.0
+    """Length over thickness of a strip; a strip that is shorter than ten thicknesses is as wide as thick."""
     length: float = 0.1
-    eigenstrain: float = 0.02
-    stimulus: str = "ramp"
-    turns: float = 0.0
+    """Of a strip [m]: the unit of the scene. Gravity and speeds are those of a strip of 0.1 m, scaled with it."""
+    eigenstrain: float = 0.02  # Of the lower layer, at the largest stimulus
+    stimulus: str = "ramp"  # How the stimulus gets there: one of `STIMULI`
+    turns: float = 0.0  # Natural curvature times length, over 2π
     speed: float = 1.0
+    """Of what flies, at a length of 0.1 m [m/s]; what falls does so from the height that gives it, 10 m at most."""
     friction: float = 0.4
     threshold: float = 1e-3
-    contact_stiffness: float = 1e6
-    barrier: float = 2e-4
+    """`friction`, `threshold`: coefficient, and the speed from which it acts [m/s]."""
+    contact_stiffness: float = 1e6  # [Pa]
+    barrier: float = 2e-4  # Distance at a length of 0.1 m [m]
     restitution: float | None = None
-    mass_ratio: float = 1.0
-    fluid_ratio: float = 0.0
+    mass_ratio: float = 1.0  # Mass of the body over that of the strips
+    fluid_ratio: float = 0.0  # Density of the fluid over that of the strip; 0 without a fluid
     added_mass: bool = False
-    gravity: float = 9.81
-    damped: bool = True
+    gravity: float = 9.81  # At a length of 0.1 m [m/s²]
+    damped: bool = True  # Whether the material has a retardation time
 
     def text(self) -> str:
         """Return the settings that differ from the defaults, in one line."""
@@ -104,24 +62,13 @@ def _short(value: object) -> str:
 
 @dataclass(frozen=True)
 class Range:
-    """An axis: the interval from which the sample draws, and the values it takes alone.
-
-    Attributes
-    ----------
-    low, high : float
-    values : tuple of float
-        Alone, from easy or extreme to extreme.
-    robots : tuple of str
-        For which the axis is gone through alone.
-    logarithmic : bool
-        Whether the sample is even in the logarithm.
-    """
+    """An axis: the interval from which the sample draws, and the values it takes alone."""
 
     low: float
     high: float
-    values: tuple[float, ...]
-    robots: tuple[str, ...]
-    logarithmic: bool = True
+    values: tuple[float, ...]  # Alone, from easy or extreme to extreme
+    robots: tuple[str, ...]  # For which the axis is gone through alone
+    logarithmic: bool = True  # Whether the sample is even in the logarithm
 
     def at(self, part: float) -> float:
         """Return the value at a part of the interval, 0 … 1.

@@ -26,13 +26,7 @@ the least [s].
 def run_cases(cases: Iterable[StressCase], workers: int, done: Callable[[Record], None]) -> None:
     """Run cases, and hand on what comes of each as soon as it has.
 
-    Parameters
-    ----------
-    cases : iterable of StressCase
-    workers : int
-        Processes.
-    done : callable
-        Called with each record.
+    `workers`: number of processes. `done`: called with each record.
     """
     left = list(reversed(list(cases)))
     with _started(workers) as begin:

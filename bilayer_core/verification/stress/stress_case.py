@@ -23,22 +23,13 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True)
 class Decision:
-    """A figure that decides a case, and the interval in which it must lie.
+    """A figure that decides a case, and the interval in which it must lie."""
 
-    Attributes
-    ----------
-    what : str
-        In one line, with the source of the reference.
-    computed, low, high : float
-    unit : str
-        Of all three; ``"1"`` for pure numbers.
-    """
-
-    what: str
+    what: str  # In one line, with the source of the reference
     computed: float
     low: float
     high: float
-    unit: str = "1"
+    unit: str = "1"  # Of all three; ``"1"`` for pure numbers
 
     @property
     def holds(self) -> bool:
@@ -60,42 +51,20 @@ class Decision:
 
 @dataclass(frozen=True)
 class StressCase:
-    """A scene, how far it goes, and what decides it.
+    """A scene, how far it goes, and what decides it."""
 
-    Attributes
-    ----------
-    name : str
-        Groups and case with slashes between.
-    content : callable or str
-        Returns the content of its scene file; or the path of one.
-    outside : tuple of str
-        Why it is outside the region of validity; empty inside.
-    most_steps : int
-        Accepted steps after which it ends.
-    look_every : int
-        The judge's looks, in steps.
-    cpu_limit : float
-        CPU time [s] after which its run ends where it is; a multiple of it later its process is killed.
-    decide : callable or None
-        Runs the trial as it needs to, and returns the decision; without one the trial runs to the end of the scene.
-    compared : bool
-        Whether its error is found from a finer run.
-    budget : bool
-        Whether its energy budget is kept and judged, beside the account that every run keeps.
-    axis : str
-        The axis that it belongs to alone.
-    """
-
-    name: str
-    content: Callable[[], dict] | str
-    outside: tuple[str, ...] = ()
-    most_steps: int = 2000
-    look_every: int = 1
+    name: str  # Groups and case with slashes between
+    content: Callable[[], dict] | str  # Returns the content of its scene file; or the path of one
+    outside: tuple[str, ...] = ()  # Why it is outside the region of validity; empty inside
+    most_steps: int = 2000  # Accepted steps after which it ends
+    look_every: int = 1  # The judge's looks, in steps
     cpu_limit: float = 20.0
+    """CPU time [s] after which its run ends where it is; a multiple of it later its process is killed."""
     decide: Callable[[Trial], Decision] | None = None
-    compared: bool = False
-    budget: bool = False
-    axis: str = ""
+    """Runs the trial as it needs to, and returns the decision; without one the trial runs to the end of the scene."""
+    compared: bool = False  # Whether its error is found from a finer run
+    budget: bool = False  # Whether its energy budget is kept and judged, beside the account that every run keeps
+    axis: str = ""  # The axis that it belongs to alone
 
     def scene(self) -> dict | str:
         """Return the content or the path of the scene, as `load_scene` takes it."""
@@ -109,43 +78,25 @@ class StressCase:
 
 @dataclass
 class Record:
-    """Result of a case: a line of the journal.
-
-    Attributes
-    ----------
-    name, axis : str
-    inside : bool
-        Whether it is in the region of validity.
-    outcome : Outcome
-    reason : str
-        Why it was refused or failed, or why its error is not known.
-    remedy : str
-        What a refusal says to change; ``remedy_works`` whether that helped, None if nothing was tried.
-    error : float or None
-        Largest distance of a node or a body from where a finer run has it, at output times, over the length of the
-        longest strip, or over the longest way of anything if that is longer. Of a torture case the relative error of
-        what decides it.
-    decision : str
-        What decided a torture case.
-    figures : dict
-        Counts and extremes of the run.
-    cpu_time : float
-        Of all of it [s].
-    """
+    """Result of a case: a line of the journal."""
 
     name: str
     axis: str
-    inside: bool
+    inside: bool  # Whether it is in the region of validity
     outside: list[str]
     outcome: Outcome
-    reason: str = ""
-    remedy: str = ""
+    reason: str = ""  # Why it was refused or failed, or why its error is not known
+    remedy: str = ""  # What a refusal says to change; ``remedy_works`` whether that helped, None if nothing was tried
     remedy_works: bool | None = None
     error: float | None = None
-    decision: str = ""
-    figures: dict[str, float | int | None] = field(default_factory=dict)
+    """Largest distance of a node or a body from where a finer run has it, at output times, over the length of the
+    longest strip, or over the longest way of anything if that is longer. Of a torture case the relative error of
+    what decides it.
+    """
+    decision: str = ""  # What decided a torture case
+    figures: dict[str, float | int | None] = field(default_factory=dict)  # Counts and extremes of the run
     warnings: list[str] = field(default_factory=list)
-    cpu_time: float = 0.0
+    cpu_time: float = 0.0  # Of all of it [s]
 
     def line(self) -> str:
         """Return the record as a line of JSON."""

@@ -23,19 +23,8 @@ MOST_SHRUNK = 20
 def chosen_cases(only: Sequence[str], quick: bool, scenes: Sequence[str] = ()) -> dict[str, StressCase]:
     """Return the cases to run, in order.
 
-    Parameters
-    ----------
-    only : sequence of str
-        Names with ``*``.
-    quick : bool
-        Those of a quick run alone.
-    scenes : sequence of str
-        Scene files to judge instead.
-
-    Raises
-    ------
-    InputError
-        If a pattern fits none.
+    `only`: names with ``*``. `quick`: those of a quick run alone. `scenes`: scene files to judge instead. Raises
+    InputError if a pattern fits none.
     """
     if scenes:
         return {name: StressCase(name, name, compared=True) for name in scenes}

@@ -18,7 +18,7 @@ from bilayer_core.verification.validate.closed_forms import (
     heavy_cantilever,
 )
 from bilayer_core.verification.validate.parts import GEL, fixed, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 LENGTH, WIDTH, THICKNESS, DENSITY, GRAVITY = 0.1, 0.01, 2e-3, 1000.0, 9.81
 SOFT = 1e6
@@ -182,21 +182,14 @@ CASES = [
     ),
     Case("beams/cantilever tip/order in space", "order 2 of the bending elements", 0.1, order_in_space, scale=1.0),
     Case("beams/Euler's load", "π² EI/4L², by the stability of the straight column", 0.01, eulers_load),
-    *(
-        Case(
-            f"beams/imperfect column/{part:g} of Euler's load",
-            "1/(1 − P/P_cr) times the imperfection",
-            2e-3,
-            lambda part=part: imperfect_column(part),
-        )
-        for part in (0.5, 0.9)
+    *cases(
+        "beams/imperfect column/{:g} of Euler's load",
+        "1/(1 − P/P_cr) times the imperfection",
+        2e-3,
+        imperfect_column,
+        (0.5, 0.9),
     ),
     Case("beams/Greenhill's weight", "q L³ = 7.837 EI, by the stability of the column", 0.01, greenhills_weight),
-    *(
-        Case(
-            f"beams/bonded stiffness/{pair}", "F L³/3EI of the bonded section", 0.01, lambda p=pair: bonded_tip(p), "mm"
-        )
-        for pair in PAIRS
-    ),
+    *cases("beams/bonded stiffness/{}", "F L³/3EI of the bonded section", 0.01, bonded_tip, PAIRS, unit="mm"),
     Case("beams/vibration", "1.875² √(EI/ρA)/2πL²", 0.005, vibration, "Hz", long=True),
 ]

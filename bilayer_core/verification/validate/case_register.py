@@ -81,10 +81,7 @@ def select(pattern: str | None = None, quick: bool = False) -> list[Case]:
     """Return the cases whose name contains `pattern`, or matches it where it has wildcards; without the long ones on
     request.
 
-    Raises
-    ------
-    InputError
-        If there is none.
+    Raises InputError if there is none.
     """
     text = (pattern or "").casefold()
     if any(sign in text for sign in "*?["):

@@ -244,29 +244,21 @@ def kirchhoff_plate(velocity: tuple[float, float], own: float, whole: float, mom
 
 @dataclass(frozen=True)
 class StickSlip:
-    """A mass on a belt that travels a given distance and stops (cubic smoothstep), held by a spring from rest on.
-
-    Attributes
-    ----------
-    mass, stiffness : float
-        [kg], [N/m]
-    coefficient, threshold : float
-        μ and ε_v [m/s].
-    normal_force, amplitude, period : float
-        N = normal_force + amplitude sin(2π t/period) [N], [s].
-    travel, duration : float
-        Of the belt [m], [s].
-    """
+    """A mass on a belt that travels a given distance and stops (cubic smoothstep), held by a spring from rest on."""
 
     mass: float
     stiffness: float
+    """`mass`, `stiffness`: [kg], [N/m]"""
     coefficient: float
     threshold: float
+    """`coefficient`, `threshold`: μ and ε_v [m/s]."""
     normal_force: float
     amplitude: float
     period: float
+    """`normal_force`, `amplitude`, `period`: N = normal_force + amplitude sin(2π t/period) [N], [s]."""
     travel: float
     duration: float
+    """`travel`, `duration`: of the belt [m], [s]."""
 
 
 def stick_slip(p: StickSlip, times: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.testing.gaps import GapCheck
 from bilayer_core.verification.validate.closed_forms import oblique_slide
 from bilayer_core.verification.validate.parts import GROUND, ball, contact, fixed, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 GRAVITY = 9.81
 MESHES = (10, 20, 40)
@@ -290,15 +290,13 @@ def rolling_slip(kind: str) -> tuple[float, float]:
 
 
 CASES = [
-    *(
-        Case(
-            f"contact/resting gap/{edges} edges",
-            "barrier law: the force on each length is its weight (gap 0.9974448 mm, below d̂ by)",
-            0.01,
-            lambda edges=edges: compression(edges),
-            "µm",
-        )
-        for edges in MESHES
+    *cases(
+        "contact/resting gap/{} edges",
+        "barrier law: the force on each length is its weight (gap 0.9974448 mm, below d̂ by)",
+        0.01,
+        compression,
+        MESHES,
+        unit="µm",
     ),
     Case("contact/slide", "g (sin α − μ cos α)", 0.005, slide, "m/s²"),
     Case(
@@ -335,25 +333,21 @@ CASES = [
     Case("contact/slide on a ribbon", "g (sin α − μ cos α)", 0.005, slide_on_a_ribbon, "m/s²"),
     Case("contact/rebound at 14 m/s", "energy of a flat strip with sound at 3 m/s, over that before", 0.005, rebound),
     Case("contact/creep", "ε_v (1 − √(1 − tan α/μ))", 0.01, creep, "µm/s"),
-    *(
-        Case(
-            f"contact/slide {direction}",
-            "g_x − μ g with the coefficient of that direction",
-            0.01,
-            lambda direction=direction: slide_toward(direction),
-            "m/s²",
-        )
-        for direction in DIRECTIONS
+    *cases(
+        "contact/slide {}",
+        "g_x − μ g with the coefficient of that direction",
+        0.01,
+        slide_toward,
+        DIRECTIONS,
+        unit="m/s²",
     ),
-    *(
-        Case(
-            f"contact/slide obliquely/{axis}",
-            "greatest dissipation, μ = 0.1 along and 0.4 across, by Runge–Kutta",
-            0.01,
-            lambda k=k: (_oblique()[0][k], _oblique()[1][k]),
-            "m/s",
-        )
-        for k, axis in enumerate("xy")
+    *cases(
+        "contact/slide obliquely/{1}",
+        "greatest dissipation, μ = 0.1 along and 0.4 across, by Runge–Kutta",
+        0.01,
+        lambda k, _axis: (_oblique()[0][k], _oblique()[1][k]),
+        enumerate("xy"),
+        unit="m/s",
     ),
     *(
         Case(

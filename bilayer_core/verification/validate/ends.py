@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import product
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate import bending, helix
 from bilayer_core.verification.validate.closed_forms import bonded_helix, timoshenko
 from bilayer_core.verification.validate.parts import GEL
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 PAIRS = ((1.0, 1.0), (3.3, 6.7), (0.2, 3.0))
 """(m, n): the second is the one that is off most where nothing bends the last half edge."""
@@ -78,15 +79,12 @@ def last_turn(torsion: str, natural: tuple[float, float]) -> tuple[float, float]
 
 
 CASES = [
-    *(
-        Case(
-            f"ends/free end m = {m:g}, n = {n:g}/{dimension}-D",
-            "Timoshenko's bilayer (1925), formula corrected",
-            1e-3,
-            lambda m=m, n=n, dimension=dimension: beside_free_end(m, n, dimension),
-        )
-        for m, n in PAIRS
-        for dimension in (2, 3)
+    *cases(
+        "ends/free end m = {:g}, n = {:g}/{}-D",
+        "Timoshenko's bilayer (1925), formula corrected",
+        1e-3,
+        beside_free_end,
+        [(m, n, dimension) for m, n in PAIRS for dimension in (2, 3)],
     ),
     *(
         Case(
@@ -100,16 +98,13 @@ CASES = [
         for i, figure in enumerate(("angle", "tip"))
         for dimension in (2, 3)
     ),
-    *(
-        Case(
-            f"ends/patch between stations/{model}, {stations} stations",
-            "Timoshenko's curvature times the length of the patch",
-            1e-3,
-            lambda model=model, stations=stations: turned(model, stations),
-            "rad",
-        )
-        for model in ("laminate", "two_rod")
-        for stations in (11, 21, 34, 81)
+    *cases(
+        "ends/patch between stations/{}, {} stations",
+        "Timoshenko's curvature times the length of the patch",
+        1e-3,
+        turned,
+        product(("laminate", "two_rod"), (11, 21, 34, 81)),
+        unit="rad",
     ),
     *(
         Case(

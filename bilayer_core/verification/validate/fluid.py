@@ -12,7 +12,7 @@ from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.closed_forms import kirchhoff_plate
 from bilayer_core.verification.validate.motion import let_go
 from bilayer_core.verification.validate.parts import GEL, contact, fixed, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 WIDTH, THICKNESS, DENSITY = 0.01, 2e-3, 1000.0
 OWN = DENSITY * WIDTH * THICKNESS
@@ -158,36 +158,33 @@ CASES = [
         )
         for speed, added in ((0.1, True), (0.3, False), (0.5, True), (1.0, False))
     ),
-    *(
-        Case(
-            f"fluid/turning strip/{name}",
-            "ω₀/(1 + ω₀ c t/J), c = ρ C w⁴/64 per length",
-            1e-3,
-            lambda layers=layers: turning(layers),
-            "rad/s",
-        )
-        for name, layers in (("one layer", WHOLE), ("two layers", HALVES))
+    *cases(
+        "fluid/turning strip/{}",
+        "ω₀/(1 + ω₀ c t/J), c = ρ C w⁴/64 per length",
+        1e-3,
+        lambda _name, layers: turning(layers),
+        (("one layer", WHOLE), ("two layers", HALVES)),
+        unit="rad/s",
     ),
     Case("fluid/sinking ball", "v tanh(g t/v), v = √(2 m g/ρ C π r²)", 1e-4, sinking_ball, "m/s"),
-    *(
-        Case(
-            f"fluid/acceleration/{direction}, {name}",
-            "own mass over the sum with that of an ellipse's fluid",
-            1e-9,
-            lambda direction=direction, layers=layers: acceleration(direction, layers),
-            "m/s²",
-        )
-        for direction in AXES
-        for name, layers in (("one layer", WHOLE), ("two layers", HALVES))
+    *cases(
+        "fluid/acceleration/{}, {}",
+        "own mass over the sum with that of an ellipse's fluid",
+        1e-9,
+        lambda direction, _name, layers: acceleration(direction, layers),
+        [
+            (direction, name, layers)
+            for direction in AXES
+            for name, layers in (("one layer", WHOLE), ("two layers", HALVES))
+        ],
+        unit="m/s²",
     ),
-    *(
-        Case(
-            f"fluid/Munk's moment/{name}",
-            "Kirchhoff's equations of a rigid plate, by Runge–Kutta",
-            0.002,
-            lambda across=across: munk(across),
-            "rad",
-        )
-        for name, across in (("from below", 0.2), ("from above", -0.2))
+    *cases(
+        "fluid/Munk's moment/{}",
+        "Kirchhoff's equations of a rigid plate, by Runge–Kutta",
+        0.002,
+        lambda _name, across: munk(across),
+        (("from below", 0.2), ("from above", -0.2)),
+        unit="rad",
     ),
 ]

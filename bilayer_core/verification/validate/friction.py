@@ -12,7 +12,7 @@ from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.closed_forms import StickSlip, stick_slip
 from bilayer_core.verification.validate.parts import GROUND, contact, fixed, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 GRAVITY, MASS = 10.0, 0.01
 SIZE = (0.04, 0.04, 0.002)
@@ -392,54 +392,55 @@ CASES = [
             *(({"integrator": name, "dt": 1e-3}, 2e-3) for name in SECOND_ORDER),
         )
     ),
-    *(
-        Case(
-            f"friction/grain at {angle:g}°/{what}",
-            "velocity after 0.5 s, m a = pull − N M² d/|M d|, a along d; M: 0.2 along, 0.6 against, 0.4 across grain",
-            2e-5,
-            lambda angle=angle, off=off: speed_over_grain(math.radians(angle), math.radians(off), {}),
-            "m/s",
-            scale=1.0,
-        )
-        for angle in (0.0, 77.0)
-        for what, off in (("along it", 0.0), ("against it, stuck", 180.0), ("40° off it", 40.0), ("100° off it", 100.0))
+    *cases(
+        "friction/grain at {:g}°/{}",
+        "velocity after 0.5 s, m a = pull − N M² d/|M d|, a along d; M: 0.2 along, 0.6 against, 0.4 across grain",
+        2e-5,
+        lambda angle, _what, off: speed_over_grain(math.radians(angle), math.radians(off), {}),
+        [
+            (angle, what, off)
+            for angle in (0.0, 77.0)
+            for what, off in (
+                ("along it", 0.0),
+                ("against it, stuck", 180.0),
+                ("40° off it", 40.0),
+                ("100° off it", 100.0),
+            )
+        ],
+        unit="m/s",
+        scale=1.0,
     ),
-    *(
-        Case(
-            f"friction/stride/{forward:g} and {backward:g}, {stations} stations",
-            "ε L (μ₋ − μ₊)/(μ₋ + μ₊), by the place where an evenly extending strip rests",
-            0.01,
-            lambda forward=forward, backward=backward, stations=stations: stride(forward, backward, stations),
-            "mm",
-        )
-        for forward, backward in ((0.4, 0.5), (0.2, 0.8))
-        for stations in (21, 41, 81)
+    *cases(
+        "friction/stride/{:g} and {:g}, {} stations",
+        "ε L (μ₋ − μ₊)/(μ₋ + μ₊), by the place where an evenly extending strip rests",
+        0.01,
+        stride,
+        [(forward, backward, stations) for forward, backward in ((0.4, 0.5), (0.2, 0.8)) for stations in (21, 41, 81)],
+        unit="mm",
     ),
-    *(
-        Case(
-            f"friction/stride {name}/0.4 and 0.5, {stations} stations",
-            "ε L (μ₋ − μ₊)/(μ₋ + μ₊), by the place where an evenly extending strip rests",
-            0.01,
-            lambda obstacles=obstacles, stations=stations: stride(0.4, 0.5, stations, obstacles),
-            "mm",
-        )
-        for name, obstacles in ON_BOXES.items()
-        for stations in (21, 41)
+    *cases(
+        "friction/stride {0}/0.4 and 0.5, {2} stations",
+        "ε L (μ₋ − μ₊)/(μ₋ + μ₊), by the place where an evenly extending strip rests",
+        0.01,
+        lambda _name, obstacles, stations: stride(0.4, 0.5, stations, obstacles),
+        [(name, obstacles, stations) for name, obstacles in ON_BOXES.items() for stations in (21, 41)],
+        unit="mm",
     ),
-    *(
-        Case(
-            f"friction/pressure under a sliding strip/{name}, {dimension}-D",
-            "μ h before its middle, at the height h of its mass centre over its face",
-            1e-3,
-            lambda under=under, width=width, dimension=dimension: shift_of_pressure(under, width, dimension),
-            "mm",
-        )
-        for name, under, width in (
-            ("on the ground", "ground", 1e-2),
-            ("on a ribbon", "strip", 1e-2),
-            ("round on round", "strip", 4e-3),
-        )
-        for dimension in (2, 3)
+    *cases(
+        "friction/pressure under a sliding strip/{0}, {3}-D",
+        "μ h before its middle, at the height h of its mass centre over its face",
+        1e-3,
+        lambda _name, under, width, dimension: shift_of_pressure(under, width, dimension),
+        [
+            (name, under, width, dimension)
+            for name, under, width in (
+                ("on the ground", "ground", 1e-2),
+                ("on a ribbon", "strip", 1e-2),
+                ("round on round", "strip", 4e-3),
+            )
+            for dimension in (2, 3)
+        ],
+        unit="mm",
     ),
     Case(
         "friction/round rod that rolls down two others",

@@ -6,7 +6,7 @@ from bilayer_core.engine.energy_account import FREE, LARGEST, LOWEST
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.parts import GROUND, contact, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 SPEED, BARRIER = 10.0, 1e-4
 """Of the ball before it meets the table [m/s], and the barrier distance [m]."""
@@ -52,33 +52,31 @@ def most_made(integrator: str, dt: float) -> float:
 
 
 CASES = [
-    *(
-        Case(
-            f"impacts/ball of 10 m/s/{dimension}-D {integrator}",
-            "an elastic barrier gives the speed back",
-            0.02,
-            lambda dimension=dimension, integrator=integrator, tolerance=tolerance: (
-                rebound(dimension, integrator, tolerance),
-                1.0,
-            ),
-        )
-        for dimension in (2, 3)
-        for integrator, tolerance in TOLERANCES.items()
+    *cases(
+        "impacts/ball of 10 m/s/{}-D {}",
+        "an elastic barrier gives the speed back",
+        0.02,
+        lambda dimension, integrator, tolerance: (
+            rebound(dimension, integrator, tolerance),
+            1.0,
+        ),
+        [(dimension, integrator, tolerance) for dimension in (2, 3) for integrator, tolerance in TOLERANCES.items()],
     ),
-    *(
-        Case(
-            f"impacts/restitution {restitution:g}/{dimension}-D {integrator}",
-            "speed after the impact over that before",
-            0.02,
-            lambda dimension=dimension, integrator=integrator, tolerance=tolerance, restitution=restitution: (
-                rebound(dimension, integrator, tolerance, restitution=restitution),
-                restitution,
-            ),
-            scale=1.0,
-        )
-        for restitution in (0.0, 0.1, 0.5, 0.9)
-        for dimension in (2, 3)
-        for integrator, tolerance in TOLERANCES.items()
+    *cases(
+        "impacts/restitution {:g}/{}-D {}",
+        "speed after the impact over that before",
+        0.02,
+        lambda restitution, dimension, integrator, tolerance: (
+            rebound(dimension, integrator, tolerance, restitution=restitution),
+            restitution,
+        ),
+        [
+            (restitution, dimension, integrator, tolerance)
+            for restitution in (0.0, 0.1, 0.5, 0.9)
+            for dimension in (2, 3)
+            for integrator, tolerance in TOLERANCES.items()
+        ],
+        scale=1.0,
     ),
     *(
         Case(

@@ -10,7 +10,7 @@ import numpy as np
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.parts import GEL, fixed, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 LENGTH, WIDTH, THICKNESS, EDGES = 0.1, 0.01, 1e-3, 40
 BENDING = GEL["youngs_modulus"] * WIDTH * THICKNESS**3 / 12.0
@@ -251,15 +251,13 @@ CASES = [
         )
         for model, dimension in SIZES
     ),
-    *(
-        Case(
-            f"joints/swinging strip/{dimension}-D {model}",
-            "period of a rigid strip on a hinge, 2π √(2L/3g) to second order in thickness and angle",
-            5e-4,
-            lambda model=model, dimension=dimension: period(model, dimension),
-            unit="ms",
-        )
-        for model, dimension in SIZES
+    *cases(
+        "joints/swinging strip/{1}-D {0}",
+        "period of a rigid strip on a hinge, 2π √(2L/3g) to second order in thickness and angle",
+        5e-4,
+        period,
+        SIZES,
+        unit="ms",
     ),
     *(
         Case(
@@ -275,18 +273,15 @@ CASES = [
         )
         for model, dimension in SIZES
     ),
-    *(
-        Case(
-            f"joints/{name}/{dimension}-D {model}",
-            "sinking of a strip in one part",
-            1e-5,
-            lambda model=model, dimension=dimension, name=name: (
-                _sinking(model, dimension, name),
-                _sinking(model, dimension),
-            ),
-            unit="mm",
-        )
-        for name in ("junction", "weld")
-        for model, dimension in SIZES
+    *cases(
+        "joints/{0}/{2}-D {1}",
+        "sinking of a strip in one part",
+        1e-5,
+        lambda name, model, dimension: (
+            _sinking(model, dimension, name),
+            _sinking(model, dimension),
+        ),
+        [(name, model, dimension) for name in ("junction", "weld") for model, dimension in SIZES],
+        unit="mm",
     ),
 ]

@@ -20,7 +20,7 @@ from bilayer_core.verification.validate.closed_forms import (
     timoshenko,
 )
 from bilayer_core.verification.validate.parts import GEL, fixed, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 MODEL = "laminate"
 EXACT = 1e-9
@@ -104,24 +104,20 @@ def _helix_case(kind: str, natural: tuple[float, float], index: int) -> list[Cas
 
 
 CASES = [
-    *(
-        Case(
-            f"laminate/every node, m = {m:g}, n = {n:g}",
-            "Timoshenko's bilayer (1925), formula corrected; ends included",
-            EXACT,
-            lambda m=m, n=n: every_node(m, n),
-        )
-        for m, n in bending.PAIRS
+    *cases(
+        "laminate/every node, m = {:g}, n = {:g}",
+        "Timoshenko's bilayer (1925), formula corrected; ends included",
+        EXACT,
+        every_node,
+        bending.PAIRS,
     ),
-    *(
-        Case(
-            f"laminate/covered part/{edges} edges",
-            "curvature times the length that the layer covers",
-            5e-3,
-            lambda edges=edges: covered_part(edges),
-            "rad",
-        )
-        for edges in (20, 40)
+    *cases(
+        "laminate/covered part/{} edges",
+        "curvature times the length that the layer covers",
+        5e-3,
+        covered_part,
+        (20, 40),
+        unit="rad",
     ),
     *(
         Case(
@@ -134,14 +130,12 @@ CASES = [
         for kind in ("layers", "laminate")
         for edges in torsion.MESHES
     ),
-    *(
-        Case(
-            f"laminate/cosine/{edges} edges",
-            "Timoshenko's curvature of the local growth, 5 % cos(2π s/L)",
-            EXACT,
-            lambda edges=edges: (wave(edges, None), timoshenko(1.0, 1.0)),
-        )
-        for edges in torsion.MESHES
+    *cases(
+        "laminate/cosine/{} edges",
+        "Timoshenko's curvature of the local growth, 5 % cos(2π s/L)",
+        EXACT,
+        lambda edges: (wave(edges, None), timoshenko(1.0, 1.0)),
+        torsion.MESHES,
     ),
     *(
         case

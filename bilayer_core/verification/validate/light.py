@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from itertools import product
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.closed_forms import lag_behind, strip_towards_light, timoshenko
 from bilayer_core.verification.validate.parts import fixed, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 LENGTH, THICKNESS, GAIN = 0.1, 2e-3, 0.02
 CURVATURE = timoshenko(1.0, 1.0) * GAIN / THICKNESS
@@ -164,26 +165,20 @@ CASES = [
             ("sdirk2, 2.5 ms", {"integrator": "sdirk2", "dt": 2.5e-3}, 3e-4),
         )
     ),
-    *(
-        Case(
-            f"light/order in time/{name}",
-            "the integrator's order, at the tip of a bilayer that light swings",
-            0.15,
-            lambda name=name: order_in_time(name),
-            scale=1.0,
-        )
-        for name in INTEGRATORS
+    *cases(
+        "light/order in time/{}",
+        "the integrator's order, at the tip of a bilayer that light swings",
+        0.15,
+        order_in_time,
+        INTEGRATORS,
+        scale=1.0,
     ),
-    *(
-        Case(
-            f"light/shadow of a {by}, {angle:g}°/{model}",
-            "straight rays: the part of the strip beside the shadow",
-            2e-3,
-            lambda by=by, angle=angle, model=model: lit_part(by, angle, model),
-            scale=1.0,
-        )
-        for by in ("box", "cylinder", "rod")
-        for angle in (0.0, 30.0, -20.0)
-        for model in ("laminate", "two_rod")
+    *cases(
+        "light/shadow of a {}, {:g}°/{}",
+        "straight rays: the part of the strip beside the shadow",
+        2e-3,
+        lit_part,
+        product(("box", "cylinder", "rod"), (0.0, 30.0, -20.0), ("laminate", "two_rod")),
+        scale=1.0,
     ),
 ]

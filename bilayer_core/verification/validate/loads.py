@@ -9,7 +9,7 @@ from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.beams import BENDING, LENGTH, SOFT, THICKNESS, beam
 from bilayer_core.verification.validate.closed_forms import end_loaded_cantilever
 from bilayer_core.verification.validate.parts import fixed, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 LARGE = 2.0
 """F L²/EI; the tip moves by about half the length."""
@@ -65,13 +65,17 @@ def tip_weight() -> tuple[float, float]:
 
 HALVES = [layer("bottom"), layer("top")]
 CASES = [
-    *(
-        Case(f"loads/small force/{name}", "F a² (3 L − a)/6EI", 1e-3, lambda a=arguments: small_force(*a), "µm")
-        for name, arguments in {
+    *cases(
+        "loads/small force/{}",
+        "F a² (3 L − a)/6EI",
+        1e-3,
+        lambda _name, arguments: small_force(*arguments),
+        {
             "at the tip": (None, LENGTH),
             "at the tip, two layers": (HALVES, LENGTH),
             "between two stations": (None, 0.6135 * LENGTH),
-        }.items()
+        }.items(),
+        unit="µm",
     ),
     *(
         Case(

@@ -11,7 +11,7 @@ from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.joints import EDGES, LENGTH, SIZES, THICKNESS, WIDTH, layers_of
 from bilayer_core.verification.validate.parts import GEL, fixed, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 GRAVITY = 9.81
 MASS, INERTIA, ARM = 2e-3, 3e-7, 0.03
@@ -207,15 +207,13 @@ def universal_joint(bend: float) -> tuple[float, float]:
 
 
 CASES = [
-    *(
-        Case(
-            f"mechanisms/spring of a hinge/{dimension}-D {model}",
-            "period of a rigid strip on a hinge with a spring, 2π √(I/k)",
-            1e-3,
-            lambda model=model, dimension=dimension: spring_period(model, dimension),
-            unit="ms",
-        )
-        for model, dimension in SIZES
+    *cases(
+        "mechanisms/spring of a hinge/{1}-D {0}",
+        "period of a rigid strip on a hinge with a spring, 2π √(I/k)",
+        1e-3,
+        spring_period,
+        SIZES,
+        unit="ms",
     ),
     *(
         Case(f"mechanisms/{name}/{dimension}-D", against, limit, lambda m=measure, d=dimension: m(d), unit=unit)
@@ -236,14 +234,12 @@ CASES = [
         )
         for dimension in (2, 3)
     ),
-    *(
-        Case(
-            f"mechanisms/universal joint/{bend}°",
-            "ratio of speeds, cos β/(1 − sin²β cos²θ), largest difference over a turn",
-            1e-3,
-            lambda bend=bend: universal_joint(bend),
-            scale=1.0,
-        )
-        for bend in (20, 45)
+    *cases(
+        "mechanisms/universal joint/{}°",
+        "ratio of speeds, cos β/(1 − sin²β cos²θ), largest difference over a turn",
+        1e-3,
+        universal_joint,
+        (20, 45),
+        scale=1.0,
     ),
 ]

@@ -11,7 +11,7 @@ from bilayer_core.integrators.integrator_register import INTEGRATORS
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.parts import fixed, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 Array = np.ndarray
 
@@ -58,13 +58,20 @@ def _spin_lost(integrator: str, dt: float) -> float:
     gel = {"youngs_modulus": 1e5, "poisson_ratio": 0.5, "density": 1000.0}
     solver = {"dt": dt, "integrator": integrator, "newton_tolerance": 1e-11}
     simulator = Simulator(load_scene(scene([ribbon], materials={"gel": gel}, solver=solver)))
+    return change_of_spin(simulator, 0.0, 0.05)
+
+
+def change_of_spin(simulator: Simulator, settling: float, duration: float) -> float:
+    """Let a strip go at 20 rad/s; return the change of its angular momentum in a time [s] after another, over it."""
     let_go(simulator, np.cross([0, 0, 20.0], simulator.positions))
 
     def momentum() -> float:
         return float(simulator.model.rods.node_mass @ np.cross(simulator.positions, simulator.velocities)[:, 2])
 
+    if settling:
+        simulator.run(settling)
     before = momentum()
-    simulator.run(0.05)
+    simulator.run(duration)
     return momentum() / before - 1.0
 
 
@@ -204,25 +211,14 @@ def fall_by_default() -> tuple[float, float]:
 # A method that keeps angular momentum exactly has no order of its loss.
 _LOSING = [name for name in INTEGRATORS if name != "implicit_midpoint"]
 CASES = [
-    *(
-        Case(
-            f"motion/linear momentum/{name}",
-            "conserved in free flight",
-            1e-9,
-            lambda name=name: momentum_lost(name),
-            scale=1.0,
-        )
-        for name in INTEGRATORS
-    ),
-    *(
-        Case(
-            f"motion/angular momentum/{name}/order",
-            "its loss falls at the integrator's order",
-            0.15,
-            lambda name=name: order_of_spin(name),
-            scale=1.0,
-        )
-        for name in _LOSING
+    *cases("motion/linear momentum/{}", "conserved in free flight", 1e-9, momentum_lost, INTEGRATORS, scale=1.0),
+    *cases(
+        "motion/angular momentum/{}/order",
+        "its loss falls at the integrator's order",
+        0.15,
+        order_of_spin,
+        _LOSING,
+        scale=1.0,
     ),
     Case(
         "motion/angular momentum/implicit_midpoint",
@@ -232,36 +228,30 @@ CASES = [
         scale=1.0,
     ),
     Case("motion/precession", "torque-free motion of a rigid top", 1e-3, precession, "rad"),
-    *(
-        Case(
-            f"motion/order in time/{name}",
-            "the integrator's order, at a swinging bilayer's tip",
-            0.15,
-            lambda name=name: order_in_time(name),
-            scale=1.0,
-            long=True,
-        )
-        for name in INTEGRATORS
+    *cases(
+        "motion/order in time/{}",
+        "the integrator's order, at a swinging bilayer's tip",
+        0.15,
+        order_in_time,
+        INTEGRATORS,
+        scale=1.0,
+        long=True,
     ),
-    *(
-        Case(
-            f"motion/terminal velocity/{direction}",
-            "weight = ½ ρ_f w L C v², relative to the flow",
-            0.001,
-            lambda direction=direction: terminal_velocity(direction),
-            "m/s",
-        )
-        for direction in SINKING
+    *cases(
+        "motion/terminal velocity/{}",
+        "weight = ½ ρ_f w L C v², relative to the flow",
+        0.001,
+        terminal_velocity,
+        SINKING,
+        unit="m/s",
     ),
-    *(
-        Case(
-            f"motion/free fall/{name}",
-            "½ g t² under 1 mm/s² in steps of 1 µs, ½ g t (t + h) with implicit Euler",
-            1e-9,
-            lambda name=name: fall_in_short_steps(name),
-            "m",
-        )
-        for name in _LOSING
+    *cases(
+        "motion/free fall/{}",
+        "½ g t² under 1 mm/s² in steps of 1 µs, ½ g t (t + h) with implicit Euler",
+        1e-9,
+        fall_in_short_steps,
+        _LOSING,
+        unit="m",
     ),
     Case("motion/free fall/by default", "½ g t² under 1 mm/s²", 1e-9, fall_by_default, "m"),
     Case("motion/drag", "v₀/(1 + k v₀ t)", 0.01, slowing, "m/s"),

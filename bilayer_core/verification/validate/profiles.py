@@ -12,7 +12,7 @@ from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.closed_forms import timoshenko
 from bilayer_core.verification.validate.parts import GEL, fixed, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 Array = np.ndarray
 LENGTH, MODULUS, EDGES = 0.1, GEL["youngs_modulus"], 80
@@ -112,30 +112,17 @@ def local_curvature(name: str) -> tuple[float, float]:
 
 
 CASES = [
-    *(
-        Case(f"profiles/taper of {name}", "integral of the flexibility", 1e-3, lambda name=name: taper(name), "µm")
-        for name in TAPERS
-    ),
-    *(
-        Case(
-            f"profiles/Euler spiral/tip {axis}",
-            "Fresnel's integrals, by quadrature",
-            2e-4,
-            lambda k=k: spiral(k),
-            "mm",
-            scale=1e3 * LENGTH,
-        )
-        for k, axis in enumerate("xz")
+    *cases("profiles/taper of {}", "integral of the flexibility", 1e-3, taper, TAPERS, unit="µm"),
+    *cases(
+        "profiles/Euler spiral/tip {1}",
+        "Fresnel's integrals, by quadrature",
+        2e-4,
+        lambda k, _axis: spiral(k),
+        enumerate("xz"),
+        unit="mm",
+        scale=1e3 * LENGTH,
     ),
     Case("profiles/Euler spiral/order in space", "order 2 of the bending elements", 0.1, order_of_spiral, scale=1.0),
     Case("profiles/natural twist", "its integral", 2e-3, twist, "rad"),
-    *(
-        Case(
-            f"profiles/bilayer, {name} varying",
-            "Timoshenko's curvature of each section",
-            0.01,
-            lambda name=name: local_curvature(name),
-        )
-        for name in BILAYERS
-    ),
+    *cases("profiles/bilayer, {} varying", "Timoshenko's curvature of each section", 0.01, local_curvature, BILAYERS),
 ]

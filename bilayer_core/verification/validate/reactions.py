@@ -9,7 +9,7 @@ import numpy as np
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.parts import fixed, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 SOFT = {"youngs_modulus": 3e5, "poisson_ratio": 0.5, "density": 1000.0}
 GRAVITY = np.array([0.4, 0.0, -9.81])
@@ -120,17 +120,15 @@ CASES = [
             ("moment", 4, 0.5 * THIN * FORCE, "mN m", "E w h₂ η h₂/2 about the interface"),
         )
     ),
-    *(
-        Case(
-            f"reactions/blocked tip/{dimension}-D {model}",
-            "3 EI κ/2L: a clamped bilayer that would bend by κ, its tip kept in line by a joint",
-            1e-3,
-            lambda model=model, dimension=dimension: (
-                1e3 * _held_tip(model, dimension, 61),
-                1e3 * 1.5 * BENDING_STIFFNESS * CURVATURE / LENGTH,
-            ),
-            unit="mN",
-        )
-        for model, dimension in SIZES
+    *cases(
+        "reactions/blocked tip/{1}-D {0}",
+        "3 EI κ/2L: a clamped bilayer that would bend by κ, its tip kept in line by a joint",
+        1e-3,
+        lambda model, dimension: (
+            1e3 * _held_tip(model, dimension, 61),
+            1e3 * 1.5 * BENDING_STIFFNESS * CURVATURE / LENGTH,
+        ),
+        SIZES,
+        unit="mN",
     ),
 ]

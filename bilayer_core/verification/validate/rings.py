@@ -28,15 +28,18 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from itertools import product
 
 import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.closed_forms import bonded_bending_stiffness, strip_torsion
 from bilayer_core.verification.validate.motion import let_go
 from bilayer_core.verification.validate.parts import GEL, GROUND, contact, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 Array = np.ndarray
 RADIUS, WIDTH, THICKNESS = 0.05, 4e-3, 0.5e-3
@@ -101,9 +104,6 @@ def _next(simulator: Simulator, dt: float, figure) -> float:
 
 def _pulled_height(force: float) -> float:
     """Return half the height of a pulled ring [m], from the equation of its quarter."""
-    from scipy.integrate import solve_ivp
-    from scipy.optimize import brentq
-
     length, pull = 0.5 * math.pi * RADIUS, 0.5 * force / BENDING
 
     def quarter(curvature: float) -> Array:
@@ -269,12 +269,8 @@ CASES = [
         for kind in KINDS
         for n in (2, 3)
     ),
-    *(Case(f"rings/pulled gently/{kind}", "π/4 − 2/π", 0.01, lambda k=kind: softness(k)) for kind in KINDS),
-    *(
-        Case(f"rings/pulled by {part:g} EI per R²/{kind}", PULLED, 0.005, lambda k=kind, p=part: stretched(k, p), "m")
-        for kind in KINDS
-        for part in LARGE
-    ),
+    *cases("rings/pulled gently/{}", "π/4 − 2/π", 0.01, softness, KINDS),
+    *cases("rings/pulled by {1:g} EI per R²/{0}", PULLED, 0.005, stretched, product(KINDS, LARGE), unit="m"),
     Case("rings/pulled/order in space", "order 2 of bending", 0.1, order_in_space, scale=1.0),
     *(
         Case(
@@ -298,9 +294,6 @@ CASES = [
         Case(f"rings/twisted/{edges} edges", MICHELL, limit, lambda e=edges: (largest_flat_twist(e), math.sqrt(3.0)))
         for edges, limit in ((40, 0.03), (80, 0.01))
     ),
-    *(
-        Case(f"rings/rolling/friction {c:g}", "a sliding hoop's ΩR/2", 0.01, lambda c=c: rolling(c), "m/s")
-        for c in (0.2, 0.5)
-    ),
+    *cases("rings/rolling/friction {:g}", "a sliding hoop's ΩR/2", 0.01, rolling, (0.2, 0.5), unit="m/s"),
     Case("rings/rolling on", "the speed of the start", 0.01, rolling_on, "m/s"),
 ]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from itertools import product
 
 import numpy as np
 
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.parts import GROUND, contact, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import cases
 
 SPEED, SPIN, FLIGHT = 1.0, 2.0, 0.1
 """Of what is thrown [m/s], of what spins [rad/s], and how long either flies [s]."""
@@ -77,46 +78,36 @@ def resting_gap(dimension: int) -> float:
 
 
 CASES = [
-    *(
-        Case(
-            f"starts/thrown hub with a strip/{dimension}-D {model}",
-            "the hub's speed: nothing is strained",
-            1e-10,
-            lambda dimension=dimension, model=model: (thrown(dimension, model), SPEED),
-            unit="m/s",
-        )
-        for dimension in (2, 3)
-        for model in ("laminate", "two_rod")
+    *cases(
+        "starts/thrown hub with a strip/{}-D {}",
+        "the hub's speed: nothing is strained",
+        1e-10,
+        lambda dimension, model: (thrown(dimension, model), SPEED),
+        product((2, 3), ("laminate", "two_rod")),
+        unit="m/s",
     ),
-    *(
-        Case(
-            f"starts/spinning strip/{dimension}-D {model}",
-            "spin × time",
-            1e-4,
-            lambda dimension=dimension, model=model: (spun(dimension, model), SPIN * FLIGHT),
-            unit="rad",
-        )
-        for dimension in (2, 3)
-        for model in ("laminate", "two_rod")
+    *cases(
+        "starts/spinning strip/{}-D {}",
+        "spin × time",
+        1e-4,
+        lambda dimension, model: (spun(dimension, model), SPIN * FLIGHT),
+        product((2, 3), ("laminate", "two_rod")),
+        unit="rad",
     ),
-    *(
-        Case(
-            f"starts/inside the barrier/{dimension}-D rise",
-            "K b(d)/(ρ w h g): the height with the energy that the barrier stores",
-            0.01,
-            lambda dimension=dimension: (1e3 * rise(dimension), 1e3 * _stored_height()),
-            unit="mm",
-        )
-        for dimension in (2, 3)
+    *cases(
+        "starts/inside the barrier/{}-D rise",
+        "K b(d)/(ρ w h g): the height with the energy that the barrier stores",
+        0.01,
+        lambda dimension: (1e3 * rise(dimension), 1e3 * _stored_height()),
+        (2, 3),
+        unit="mm",
     ),
-    *(
-        Case(
-            f"starts/settled/{dimension}-D gap",
-            "force of the barrier = weight, by bisection",
-            1e-6,
-            lambda dimension=dimension: (resting_gap(dimension), 0.9974448),
-            unit="mm",
-        )
-        for dimension in (2, 3)
+    *cases(
+        "starts/settled/{}-D gap",
+        "force of the barrier = weight, by bisection",
+        1e-6,
+        lambda dimension: (resting_gap(dimension), 0.9974448),
+        (2, 3),
+        unit="mm",
     ),
 ]

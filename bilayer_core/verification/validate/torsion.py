@@ -5,6 +5,7 @@ varies.
 from __future__ import annotations
 
 from functools import cache
+from itertools import product
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.closed_forms import bending_of_layers, clamped_twist, strip_torsion, timoshenko
 from bilayer_core.verification.validate.parts import GEL, fixed, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 LENGTH, THICKNESS = 0.1, (1e-3, 1.5e-3)
 SHEAR_MODULUS = GEL["youngs_modulus"] / (2.0 * (1.0 + GEL["poisson_ratio"]))
@@ -167,16 +168,13 @@ CASES = [
         for torsion in ("layers", "laminate")
         for edges in MESHES
     ),
-    *(
-        Case(
-            f"torsion/{section}/{model}",
-            "torque over twist rate: GJ of the layered section",
-            0.002,
-            lambda section=section, model=model: torsional_stiffness("laminate", 40, model, section),
-            "N m²",
-        )
-        for section in SECTIONS
-        for model in ("two_rod", "laminate")
+    *cases(
+        "torsion/{}/{}",
+        "torque over twist rate: GJ of the layered section",
+        0.002,
+        lambda section, model: torsional_stiffness("laminate", 40, model, section),
+        product(SECTIONS, ("two_rod", "laminate")),
+        unit="N m²",
     ),
     *(
         Case(
@@ -189,35 +187,32 @@ CASES = [
         for torsion in ("layers", "laminate")
         for edges, limit in ((40, 0.01), (160, 0.002))
     ),
-    *(
-        Case(
-            f"locking/zigzag/{edges} edges",
-            "no alternation of curvature between neighbouring nodes (5 % growth)",
-            1e-3,
-            lambda edges=edges: zigzag(edges),
-            scale=1.0,
-        )
-        for edges in MESHES
+    *cases(
+        "locking/zigzag/{} edges",
+        "no alternation of curvature between neighbouring nodes (5 % growth)",
+        1e-3,
+        zigzag,
+        MESHES,
+        scale=1.0,
     ),
-    *(
-        Case(
-            f"locking/cosine/{edges} edges",
-            "Timoshenko's curvature of the local growth, 5 % cos(2π s/L)",
-            0.01,
-            lambda edges=edges: wave_curvature(edges),
-        )
-        for edges in MESHES
+    *cases(
+        "locking/cosine/{} edges",
+        "Timoshenko's curvature of the local growth, 5 % cos(2π s/L)",
+        0.01,
+        wave_curvature,
+        MESHES,
     ),
-    *(
-        Case(
-            f"torsion/round/{kind}, {what}, {model}",
-            "M L over the stiffness of a round section",
-            1e-3,
-            lambda inner=inner, axis=axis, model=model: turned_tube(inner, axis, model),
-            "rad",
-        )
-        for kind, inner in (("solid", 0.0), ("hollow", 1.5e-3))
-        for axis, what in ((0, "twisted"), (1, "bent"), (2, "bent across"))
-        for model in ("laminate", "two_rod")
+    *cases(
+        "torsion/round/{0}, {3}, {4}",
+        "M L over the stiffness of a round section",
+        1e-3,
+        lambda _kind, inner, axis, _what, model: turned_tube(inner, axis, model),
+        [
+            (kind, inner, axis, what, model)
+            for kind, inner in (("solid", 0.0), ("hollow", 1.5e-3))
+            for axis, what in ((0, "twisted"), (1, "bent"), (2, "bent across"))
+            for model in ("laminate", "two_rod")
+        ],
+        unit="rad",
     ),
 ]

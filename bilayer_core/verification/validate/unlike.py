@@ -20,7 +20,7 @@ from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.verification.validate.motion import let_go
 from bilayer_core.verification.validate.parts import fixed, layer, rod, scene
 from bilayer_core.verification.validate.unlike_rods import Section, end_of_rod
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 Array = np.ndarray
 LENGTH, EDGES, WIDTH, GRAVITY = 0.1, 80, 0.01, 9.81
@@ -289,22 +289,20 @@ def order_of_spin(integrator: str) -> tuple[float, float]:
 
 
 CASES = [
-    *(
-        Case(
-            f"unlike layers/weight/{name}",
-            "equilibrium of forces and moments along the path, by collocation",
-            LIMIT,
-            lambda section=section, direction=direction, axis=axis: hanging(section, direction, axis),
-            "mm",
-        )
-        for name, section, direction, axis in (
+    *cases(
+        "unlike layers/weight/{}",
+        "equilibrium of forces and moments along the path, by collocation",
+        LIMIT,
+        lambda _name, section, direction, axis: hanging(section, direction, axis),
+        (
             ("film on a slab, hanging, aside", FILM, "along", 1),
             ("moduli 1:10, horizontal, down", STIFF_TOP, "across", 1),
             ("moduli 1:10, horizontal, along", STIFF_TOP, "across", 0),
             ("densities 1:3, hanging, aside", HEAVY_TOP, "along", 1),
             ("widths 5:1, a T, horizontal, down", TEE, "across", 1),
             ("widths 5:1, a T, horizontal, along", TEE, "across", 0),
-        )
+        ),
+        unit="mm",
     ),
     Case(
         "unlike layers/weight/order in the mesh",
@@ -335,15 +333,13 @@ CASES = [
         "mm",
     ),
     Case("unlike layers/point mass", "equilibrium along the path", LIMIT, point_mass, "mm"),
-    *(
-        Case(
-            f"unlike layers/mass off the axis at the end/{name}",
-            "Euler–Bernoulli beam that stretches, small vibrations",
-            LIMIT,
-            lambda mode=mode: frequency_with_mass(mode),
-            "rad/s",
-        )
-        for mode, name in ((0, "bending"), (2, "stretching"))
+    *cases(
+        "unlike layers/mass off the axis at the end/{1}",
+        "Euler–Bernoulli beam that stretches, small vibrations",
+        LIMIT,
+        lambda mode, _name: frequency_with_mass(mode),
+        ((0, "bending"), (2, "stretching")),
+        unit="rad/s",
     ),
     Case("unlike layers/drag along", "equilibrium along the path", LIMIT, drag, "mm"),
     Case("unlike layers/pendulum", "compound pendulum, by Runge–Kutta", LIMIT, pendulum, "rad"),
@@ -356,15 +352,13 @@ CASES = [
         long=True,
     ),
     Case("unlike layers/added mass/roll", "two degrees of freedom, small angle", LIMIT, rolling, "rad"),
-    *(
-        Case(
-            f"unlike layers/free flight/momentum, {integrator}",
-            "what it was",
-            1e-9,
-            lambda integrator=integrator: (_spun(integrator, 5e-4)[0], 0.0),
-            scale=1.0,
-        )
-        for integrator in ("implicit_euler", "implicit_midpoint", "sdirk2", "tr_bdf2")
+    *cases(
+        "unlike layers/free flight/momentum, {}",
+        "what it was",
+        1e-9,
+        lambda integrator: (_spun(integrator, 5e-4)[0], 0.0),
+        ("implicit_euler", "implicit_midpoint", "sdirk2", "tr_bdf2"),
+        scale=1.0,
     ),
     *(
         Case(

@@ -4,41 +4,24 @@ from __future__ import annotations
 
 import math
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 
 from bilayer_core.errors import BilayerError
 
 
 @dataclass(frozen=True)
 class Case:
-    """A figure with a known answer.
+    """A figure with a known answer."""
 
-    Attributes
-    ----------
-    name : str
-        Family and case, with slashes between: ``"helix/laminate (40, 20)/radius"``.
-    against : str
-        What it is checked against, in one line.
-    limit : float
-        Largest error that passes.
-    measure : callable
-        Returns the figure as computed, and the answer.
-    unit : str
-        Of both; ``"1"`` for pure numbers.
-    scale : float or None
-        What their difference is divided by to be the error; None for the answer itself.
-    long : bool
-        Whether it takes more than a second or two, and ``--quick`` leaves it out.
-    """
-
-    name: str
-    against: str
-    limit: float
-    measure: Callable[[], tuple[float, float]]
-    unit: str = "1"
-    scale: float | None = None
-    long: bool = False
+    name: str  # Family and case, with slashes between: ``"helix/laminate (40, 20)/radius"``
+    against: str  # What it is checked against, in one line
+    limit: float  # Largest error that passes
+    measure: Callable[[], tuple[float, float]]  # Returns the figure as computed, and the answer
+    unit: str = "1"  # Of both; ``"1"`` for pure numbers
+    scale: float | None = None  # What their difference is divided by to be the error; None for the answer itself
+    long: bool = False  # Whether it takes more than a second or two, and ``--quick`` leaves it out
 
     @property
     def family(self) -> str:
@@ -58,29 +41,32 @@ class Case:
         return Result(self, computed, reference, error, clock.process_time() - begin, message)
 
 
+def cases(
+    name: str,
+    against: str,
+    limit: float,
+    measure: Callable[..., tuple[float, float]],
+    over: Iterable[object],
+    unit: str = "1",
+    scale: float | None = None,
+    long: bool = False,
+) -> list[Case]:
+    """Return a case for each value or tuple in `over`: they stand in the braces of `name`, and `measure` takes them."""
+    each = [values if isinstance(values, tuple) else (values,) for values in over]
+    return [Case(name.format(*values), against, limit, partial(measure, *values), unit, scale, long) for values in each]
+
+
 @dataclass(frozen=True)
 class Result:
-    """Result of a case.
-
-    Attributes
-    ----------
-    case : Case
-    computed, reference : float
-        In the case's unit.
-    error : float
-        NaN if it could not be computed.
-    cpu_time : float
-        [s]; what cases share counts for the first of them.
-    message : str
-        Why it could not be computed.
-    """
+    """Result of a case."""
 
     case: Case
     computed: float
     reference: float
-    error: float
-    cpu_time: float
-    message: str = ""
+    """`computed`, `reference`: in the case's unit."""
+    error: float  # NaN if it could not be computed
+    cpu_time: float  # [s]; what cases share counts for the first of them
+    message: str = ""  # Why it could not be computed
 
     @property
     def passed(self) -> bool:

@@ -10,9 +10,9 @@ from scipy.optimize import curve_fit
 from bilayer_core.integrators.integrator_register import INTEGRATORS
 from bilayer_core.scene.loader import load_scene
 from bilayer_core.simulation.simulator import Simulator
-from bilayer_core.verification.validate.motion import let_go
+from bilayer_core.verification.validate.motion import change_of_spin, let_go
 from bilayer_core.verification.validate.parts import fixed, layer, rod, scene
-from bilayer_core.verification.validate.validation_case import Case
+from bilayer_core.verification.validate.validation_case import Case, cases
 
 LENGTH, STATIONS, FIRST_MODE = 0.1, 31, 1.8751040687119611
 METHODS = tuple(name for name in INTEGRATORS if name not in ("implicit_euler", "implicit_midpoint"))
@@ -83,15 +83,7 @@ def spun(integrator: str) -> float:
     ribbon = rod([layer(thickness=2e-3)], length=LENGTH, stations=11, start=(-0.5 * LENGTH, 0, 0))
     solver = {"dt": 1e-3, "integrator": integrator, "newton_tolerance": 1e-11}
     simulator = Simulator(load_scene(scene([ribbon], materials={"gel": gel(0.01, 1e5)}, solver=solver)))
-    let_go(simulator, np.cross([0, 0, 20.0], simulator.positions))
-
-    def momentum() -> float:
-        return float(simulator.model.rods.node_mass @ np.cross(simulator.positions, simulator.velocities)[:, 2])
-
-    simulator.run(0.5)
-    before = momentum()
-    simulator.run(0.5)
-    return momentum() / before - 1.0
+    return change_of_spin(simulator, 0.5, 0.5)
 
 
 def order(integrator: str, time: float = 1e-3, steps: tuple[float, ...] = (1e-3, 5e-4, 2.5e-4)) -> tuple[float, float]:
@@ -136,25 +128,21 @@ CASES = [
         lambda: damping_ratio("two_rod", 3, "tr_bdf2", (0.0, 0.004)),
     ),
     Case("viscosity/creep", "1 − 1/e of the strain at rest, one retardation time after a pull", 1e-4, creep),
-    *(
-        Case(
-            f"viscosity/spin/{integrator}",
-            "angular momentum of a spinning strip, which viscosity leaves alone",
-            2e-5,
-            lambda integrator=integrator: (spun(integrator), 0.0),
-            scale=1.0,
-        )
-        for integrator in ("tr_bdf2", "generalised_alpha")
+    *cases(
+        "viscosity/spin/{}",
+        "angular momentum of a spinning strip, which viscosity leaves alone",
+        2e-5,
+        lambda integrator: (spun(integrator), 0.0),
+        ("tr_bdf2", "generalised_alpha"),
+        scale=1.0,
     ),
-    *(
-        Case(
-            f"viscosity/order in time/{integrator}",
-            "the integrator's order, at a viscous arm's tip",
-            0.15,
-            lambda integrator=integrator: order(integrator),
-            scale=1.0,
-            long=True,
-        )
-        for integrator in METHODS
+    *cases(
+        "viscosity/order in time/{}",
+        "the integrator's order, at a viscous arm's tip",
+        0.15,
+        order,
+        METHODS,
+        scale=1.0,
+        long=True,
     ),
 ]
