@@ -180,7 +180,6 @@ def test_a_path_of_many_turns_on_each_other_is_refused_in_time_and_memory(turns,
     assert reason in refusal(scene([rod([layer()]) | {"path": arc}]))
 
 
-@pytest.mark.verify
 def test_as_many_elements_as_a_light_may_have_are_built_in_time():
     light = {"sun": {"light": {"from": [0, 0, 1], "shadow": True}, "schedule": {"type": "hold", "value": 1.0}}}
     sheet = layer(eigenstrain={"stimulus": "sun", "gain": 0.01, "time_constant": 1.0})
