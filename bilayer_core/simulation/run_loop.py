@@ -247,7 +247,8 @@ class RunLoop:
         self._since_look += steps
         if not len(self._stepper.model.flattening.joint):
             return
-        if not last and self._since_look < STEPS_TO_LOOK and self._stepper.reach(self._state) < self._strips_due:
+        many = self._since_look >= STEPS_TO_LOOK or self._stepper.reach(self._state) >= self._strips_due
+        if not (self._since_look if last else many):
             return
         self._since_look, self._looked = 0, self._time
         with self.timed():
