@@ -35,7 +35,7 @@ FAILURES = {
 """Statuses of a step that failed, with the message."""
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class IntegrationReport:
     """Account of some steps, with the reason why there were no more.
 

@@ -3,16 +3,18 @@
 With w = a − u = Σ q_m v_m(z), q_m = γ_m (y_m − u), the equation of `scene.diffusion_modes` is, for faces that see the
 stimulus u and without sources,
 
-    q′ = −γ u′ − K(a) q,    K_mn(a) = ∫ S D(a) v_m′ v_n′ dz + Σ h S v_m v_n at faces with exchange
+    q′ = −γ u′ − λ q + ∫ S (D₀ − D(a)) v′ ∂a/∂z dz
 
-The integral is a sum over Gauss points. Steps of h with K₀ = K(a₀), held where all of them begin,
+Modes are those of the largest diffusivity D₀ of each layer, of rate λ. The integral, a sum over Gauss points of layers
+in which D varies, is what they lack. Steps of h take λ exactly and hold the rest,
 
-    (1 + h K₀) (q₁ − q₀) = h q′(q₀),
+    q₁ = q₀ + (1 − exp(−λ h))/λ q′(q₀)
 
-damp fast modes while K is below 2 K₀. Their error is a series in h, so steps of h and h/2 are extrapolated (Aitken and
-Neville), to third order with h/3 where that is not enough; the last two values tell the error, by which h is chosen.
-Steps of a mechanism are short beside diffusion, so that two are mostly enough. The same values give the same steps, so
-runs that are continued or replayed stay the same bit for bit. States keep y, as for any field.
+so that fast modes are damped whatever h is, since 0 < D ≤ D₀, and nothing is factorised. Their error is a series in h,
+so steps of h and h/2 are extrapolated (Aitken and Neville), to third order with h/3 where that is not enough; the last
+two values tell the error, by which h is chosen. Steps of a mechanism are short beside diffusion, so that two are mostly
+enough. The same values give the same steps, so runs that are continued or replayed stay the same bit for bit. States
+keep y, as for any field.
 """
 
 from __future__ import annotations
@@ -29,114 +31,49 @@ SHORTEST = 1e-9
 
 
 @kernel
-def _diffusivity(varied, g, a):
-    """Return the diffusivity at a point for a value of the field: linear along its curve, constant beyond [m²/s]."""
+def _lack(varied, g, a):
+    """Return D₀ − D at a point for a value of the field: linear along its curve, constant beyond [m²/s]."""
     first, last = varied.curve_first[varied.curve[g]], varied.curve_first[varied.curve[g] + 1] - 1
     if a <= varied.curve_at[first]:
-        return varied.curve_value[first]
+        return varied.curve_lack[first]
     k = first
     while k < last and varied.curve_at[k + 1] < a:
         k += 1
     if k == last:
-        return varied.curve_value[last]
+        return varied.curve_lack[last]
     part = (a - varied.curve_at[k]) / (varied.curve_at[k + 1] - varied.curve_at[k])
-    return varied.curve_value[k] + part * (varied.curve_value[k + 1] - varied.curve_value[k])
+    return varied.curve_lack[k] + part * (varied.curve_lack[k + 1] - varied.curve_lack[k])
 
 
 @kernel
-def _hold(varied, own, size, u, q):
-    """Write K(a) to the upper triangle of `matrix`, its diagonal to the last row of `level`, which is made last."""
-    matrix, diagonal, entry, square = varied.matrix, varied.level[LEVELS - 1], varied.entry[own], varied.square[own]
+def _change(varied, own, size, u, push, q):
+    """Write q′ to `change`."""
+    change = varied.change
     for i in range(size):
-        diagonal[i] = varied.exchange[square + i * size + i]
-        for j in range(i + 1, size):
-            matrix[i, j] = varied.exchange[square + i * size + j]
+        change[i] = -push * varied.amplitude[own, i] - varied.rate[own, i] * q[i]
     for g in range(varied.point[own], varied.point[own + 1]):
-        at = entry + (g - varied.point[own]) * size
-        a = u
-        for i in range(size):
-            a += varied.value[at + i] * q[i]
-        stiff = varied.weight[g] * _diffusivity(varied, g, a)
-        for i in range(size):
-            part = stiff * varied.slope[at + i]
-            diagonal[i] += part * varied.slope[at + i]
-            for j in range(i + 1, size):
-                matrix[i, j] += part * varied.slope[at + j]
-
-
-@kernel
-def _factorise(varied, size, h):
-    """Write Cholesky's factor of 1 + h K, with K as it is held, to the lower triangle of `matrix`."""
-    matrix, diagonal = varied.matrix, varied.level[LEVELS - 1]
-    for i in range(size):
-        for j in range(i):
-            matrix[i, j] = h * matrix[j, i]
-        matrix[i, i] = 1.0 + h * diagonal[i]
-    for j in range(size):
-        for k in range(j):
-            matrix[j, j] -= matrix[j, k] * matrix[j, k]
-        matrix[j, j] = math.sqrt(matrix[j, j])
-        for i in range(j + 1, size):
-            for k in range(j):
-                matrix[i, j] -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] /= matrix[j, j]
-
-
-@kernel
-def _change(varied, own, size, u, push, q, begin, change_out):
-    """Write q′ = −γ u′ − K(a) q from `begin` on."""
-    entry, square = varied.entry[own], varied.square[own]
-    for i in range(size):
-        flow = push * varied.amplitude[begin + i]
-        for j in range(size):
-            flow += varied.exchange[square + i * size + j] * q[j]
-        change_out[begin + i] = -flow
-    for g in range(varied.point[own], varied.point[own + 1]):
-        at = entry + (g - varied.point[own]) * size
         a, slope = u, 0.0
         for i in range(size):
-            a += varied.value[at + i] * q[i]
-            slope += varied.slope[at + i] * q[i]
-        flux = varied.weight[g] * _diffusivity(varied, g, a) * slope
+            a += varied.value[g, i] * q[i]
+            slope += varied.slope[g, i] * q[i]
+        flux = varied.weight[g] * _lack(varied, g, a) * slope
         for i in range(size):
-            change_out[begin + i] -= flux * varied.slope[at + i]
+            change[i] += flux * varied.slope[g, i]
 
 
 @kernel
-def _step(varied, size, h, q, begin, change):
-    """Add (1 + h K)⁻¹ h q′ to q, by the factor at hand; `change` is q′ from `begin` on, and scratch then."""
-    matrix = varied.matrix
-    for i in range(size):
-        part = h * change[begin + i]
-        for k in range(i):
-            part -= matrix[i, k] * change[begin + k]
-        change[begin + i] = part / matrix[i, i]
-    for n in range(size):
-        i = size - 1 - n
-        part = change[begin + i]
-        for k in range(i + 1, size):
-            part -= matrix[k, i] * change[begin + k]
-        change[begin + i] = part / matrix[i, i]
-        q[i] += change[begin + i]
-
-
-@kernel
-def _extrapolate(varied, own, size, u, push, h, begin, scratch):
-    """Write q after a step of length h [s] to `moved`; its error, the root mean square over the thickness, in parts of
-    what is allowed, and its order. `scratch` is written from `begin` on, where the field's modes are.
-    """
-    level, q = varied.level, varied.moved
-    whole = 0.0
-    for i in range(size):
-        whole += varied.amplitude[begin + i] ** 2
-    _hold(varied, own, size, u, varied.present)
+def _extrapolate(varied, own, size, u, push, h):
+    """Write q after a step of length h [s] to `moved`; return its error, in parts of what is allowed, and its order."""
+    level, q, change, span = varied.level, varied.moved, varied.change, varied.span
     for n in range(LEVELS):
         copy(varied.present, q)
         part, square = h / (n + 1), 0.0
-        _factorise(varied, size, part)
+        for i in range(size):
+            span[i] = -math.expm1(-varied.rate[own, i] * part) / varied.rate[own, i]
         for k in range(n + 1):
-            _change(varied, own, size, u + push * (k * part), push, q, begin, scratch)
-            _step(varied, size, part, q, begin, scratch)
+            _change(varied, own, size, u + push * (k * part), push, q)
+            for i in range(size):
+                q[i] += span[i] * change[i]
         for i in range(size):
             better = q[i]  # level[k, i] is that of n parts, extrapolated k times
             for k in range(n):
@@ -146,7 +83,7 @@ def _extrapolate(varied, own, size, u, push, h, begin, scratch):
             level[n, i] = q[i] = better
             if n > 0:
                 square += (better - level[n - 1, i]) ** 2
-        error = math.sqrt(square / whole) / varied.tolerance[own]
+        error = math.sqrt(square) / varied.tolerance[own]
         if n == LEVELS - 1 or (n > 0 and error <= 1.0):
             return error, n + 1
     return math.inf, LEVELS
@@ -172,14 +109,14 @@ def diffuse(varied, drives, f, reached, first, last, dt, reached_out):
     own, begin = varied.number[f], drives.field_first[f]
     size, push, time, h = drives.field_first[f + 1] - begin, (last - first) / dt, 0.0, dt
     for i in range(size):
-        varied.present[i] = varied.amplitude[begin + i] * (reached[begin + i] - first)
+        varied.present[i] = varied.amplitude[own, i] * (reached[begin + i] - first)
     while time < dt:
         h = min(h, dt - time)
-        error, order = _extrapolate(varied, own, size, first + push * time, push, h, begin, reached_out)
+        error, order = _extrapolate(varied, own, size, first + push * time, push, h)
         factor = LARGEST_FACTOR if error == 0.0 else SAFETY * error ** (-1.0 / order)
         if error <= 1.0 or h <= SHORTEST * dt:
             time = dt if h == dt - time else time + h
             copy(varied.moved, varied.present)
         h *= min(max(factor, LEAST_FACTOR), LARGEST_FACTOR)
     for i in range(size):
-        reached_out[begin + i] = last + varied.present[i] / varied.amplitude[begin + i]
+        reached_out[begin + i] = last + varied.present[i] / varied.amplitude[own, i]

@@ -86,7 +86,7 @@ def build_model(scene: SceneConfig, model: str = "two_rod", dimension: int = 3) 
         rods=rods,
         viscosity=_viscosity(found) if "viscosity" in forces else Viscosity.absent(),
         drives=drives,
-        varied_fields=build_varied_fields(scene, found, drives),
+        varied_fields=build_varied_fields(scene, found),
         light=build_light(scene, found, placed, rods, drives),
         plane=Plane.absent() if plane is None else _plane(plane, found, placed, rods),
         flattening=_flattening(found, rods),

@@ -351,6 +351,24 @@ def _on_cells(response: Response, cells: Cells) -> Array | float:
     return 1.0 if response.along is None else response.along[cells.edge]
 
 
+@dataclass
+class SharedRow:
+    """The parts in cells of laws that have no edge and no node in common: their strains are computed at once."""
+
+    last: int  # edge
+    grown: Array  # shape (n_cell,)
+
+
+def _share(rows: list[SharedRow], driven: Array, grown: Array) -> int:
+    """Put a law, by the edges that it drives and its parts in cells, where it has room; return which row that is."""
+    for index, row in enumerate(rows):
+        if row.last + 1 < driven.min():
+            row.last, row.grown = int(driven.max()), row.grown + grown
+            return index
+    rows.append(SharedRow(int(driven.max()), grown))
+    return len(rows) - 1
+
+
 def _add_eigenstrain(
     found: Collected,
     scene: SceneConfig,
@@ -368,7 +386,8 @@ def _add_eigenstrain(
     first_edge = np.array([[strand.first_edge] for strand in strands])
     of_edges: list[tuple[Array, ...]] = []
     of_joints: list[tuple[Array, ...]] = []
-    laws_on: list[tuple[int, int, bool, Array, Array]] = []
+    laws_on: list[tuple[int, Array, tuple[int, bool], int]] = []
+    shared: dict[tuple[int, bool], list[SharedRow]] = {}
     strip = section_of(scene, rod) == "strip"
     followed = [
         (slot, layer, law, hat)
@@ -399,23 +418,28 @@ def _add_eigenstrain(
             inside = np.zeros(cells.edge.max() + 1, dtype=bool)
             inside[driven] = True
             grown = along * (covered & inside[cells.edge])
-            laws_on += [(k, slot, bool(by), driven, grown) for by, k in enumerate(numbers) if k >= 0]
-    strains: dict[int, tuple[Array, ...]] = {}
-    for which in {(slot, by_gradient) for _, slot, by_gradient, *_ in laws_on}:  # of many laws at once
-        alike = [k for k, (_, *of, _, _) in enumerate(laws_on) if tuple(of) == which]
-        parts = whole.driven(which[0], np.stack([laws_on[k][-1] for k in alike])[:, None], which[1])
-        strains |= dict(zip(alike, zip(*parts, strict=True), strict=True))
-    for k, (number, _, _, driven, _) in enumerate(laws_on):
-        weight, bend, curl, free, twist = strains[k]
-        weight = weight[:, driven]
+            for by, number in enumerate(numbers):
+                if number >= 0:
+                    which = slot, bool(by)
+                    laws_on.append((number, driven, which, _share(shared.setdefault(which, []), driven, grown)))
+    strains = {
+        which: whole.driven(which[0], np.stack([row.grown for row in rows])[:, None], which[1])
+        for which, rows in shared.items()
+    }
+    for number, driven, which, row in laws_on:
+        at = np.union1d(driven, driven + 1)  # nodes of these edges
+        weight, bend, curl, free, twist = (
+            part[row][:, own] for part, own in zip(strains[which], (driven, at, at, at, at), strict=True)
+        )
+        joint = joints[:, at]
         of_edges.append((first_edge + driven, np.full(weight.shape, number), weight))
         for name, turn in (("curled", curl), ("freed", free), ("twisted", twist)) if strip else ():
-            turned = (turn != 0.0) & (joints >= 0)
+            turned = (turn != 0.0) & (joint >= 0)
             laws_of = np.full(turned.sum(), number)
-            found.add(**{f"{name}_joint": joints[turned], f"{name}_law": laws_of, f"{name}_weight": turn[turned]})
-        bent = (bend != 0.0) & (joints >= 0)
+            found.add(**{f"{name}_joint": joint[turned], f"{name}_law": laws_of, f"{name}_weight": turn[turned]})
+        bent = (bend != 0.0) & (joint >= 0)
         copy, _ = np.nonzero(bent)
-        of_joints.append((copy, joints[bent], np.full(len(copy), number), bend[bent]))
+        of_joints.append((copy, joint[bent], np.full(len(copy), number), bend[bent]))
     if not of_edges:
         return
     edge, law_of_edge, weight = (np.concatenate(part, axis=1) for part in zip(*of_edges, strict=True))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -138,7 +139,7 @@ class Model(ReadOnlyArrays):
         """Turns and ways of hinges, rails and joints that something resists."""
         return mechanisms_of(self.scene)
 
-    @property
+    @cached_property
     def has_surface_contact(self) -> bool:
         """True if any contact point can meet a surface."""
         return self.scene.contact is not None and bool(self.surfaces.can_collide.any())

@@ -25,14 +25,14 @@ def no_overrides(count: int) -> Array:
     return np.full((count, PARTS), math.nan)
 
 
-def jump_to(value: float | None) -> Array:
+def jump_to(value: float | None) -> tuple[float, ...]:
     """Return a row that acts at once; without a value, a row that leaves the schedule in force."""
-    return np.full(PARTS, math.nan) if value is None else np.array([value, value, 0.0, 0.0, 0.0])
+    return (math.nan,) * PARTS if value is None else (value, value, 0.0, 0.0, 0.0)
 
 
-def ramp_to(value: float, start: float, begin: float, over: float, smooth: bool) -> Array:
+def ramp_to(value: float, start: float, begin: float, over: float, smooth: bool) -> tuple[float, ...]:
     """Return a row that leads from one value to another, in a time from `begin` on [s]."""
-    return np.array([value, start, begin, begin + over, smooth])
+    return value, start, begin, begin + over, smooth
 
 
 def acts(row: Sequence[float]) -> bool:
@@ -54,5 +54,6 @@ def spans_of(row: Sequence[float]) -> list[Span]:
 
 def value_at(row: Sequence[float], time: float) -> float:
     """Return the value that is set at a time [s]; NaN if none is."""
-    spans = spans_of(row)
-    return spans[-1 if time >= row[END] else 0].value(time)
+    if not acts(row) or time >= row[END]:
+        return row[VALUE]
+    return spans_of(row)[0].value(time)

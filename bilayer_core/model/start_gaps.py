@@ -12,6 +12,8 @@ from bilayer_core.contact.broad_phase import RodSearch
 from bilayer_core.contact.facet import INSIDE
 from bilayer_core.errors import PenetrationError
 from bilayer_core.model.contact_points import contact_point_names, start_contact_points
+from bilayer_core.model.findings import told
+from bilayer_core.model.implausible_numbers import implausible_numbers
 from bilayer_core.model.model import Model
 from bilayer_core.model.points_between import points_between
 from bilayer_core.model.rod_surfaces import NearPairs
@@ -136,12 +138,19 @@ def refuse_penetration(model: Model) -> None:
         k = int(worst.gap.argmin())
         depth, contact_point, place = float(worst.gap[k]), int(worst.point[k]), worst.place[k]
         surface = surface_name(model, model.surface_names[worst.surface])
-        raise PenetrationError(
-            f"{model.scene.name}: the scene starts in penetration: {contact_point_names(model)[contact_point]} at "
+        raise _refusal(
+            model,
+            f"the scene starts in penetration: {contact_point_names(model)[contact_point]} at "
             f"({', '.join(f'{1e3 * c:.3f}' for c in place)}) mm is {abs(1e3 * depth):.4g} mm behind "
             f"the surface of {surface}{f', and {count - 1} more' if count > 1 else ''}; "
-            "all gaps must be positive at the start"
+            "all gaps must be positive at the start",
         )
+
+
+def _refusal(model: Model, fault: str) -> PenetrationError:
+    """Return the error for a scene that starts so; a number without its unit is a likely cause."""
+    questions = told(implausible_numbers(model.scene))
+    return PenetrationError("; ".join([f"{model.scene.name}: {fault}", *questions]))
 
 
 def surface_name(model: Model, name: str) -> str:
@@ -159,8 +168,9 @@ def refuse_meeting_rods(model: Model) -> None:
     worst = int(np.argmin(found.gap))
     first, second = found.names(model, worst)
     depth = -1e3 * found.gap[worst]
-    raise PenetrationError(
-        f"{model.scene.name}: the scene starts in {'penetration' if depth else 'touch'}: "
+    raise _refusal(
+        model,
+        f"the scene starts in {'penetration' if depth else 'touch'}: "
         f"{first} {f'is {depth:.4g} mm inside' if depth else 'touches'} {second}"
-        "; all gaps must be positive at the start (contact.rods: false lets rods pass through each other)"
+        "; all gaps must be positive at the start (contact.rods: false lets rods pass through each other)",
     )

@@ -24,6 +24,11 @@ class DiffusivityCurve(Part):
     value: list[PositiveDiffusivity] = Field(min_length=1)
     """Diffusivity there, as many."""
 
+    @property
+    def varies(self) -> bool:
+        """True if it is not the same everywhere."""
+        return min(self.value) < max(self.value)
+
     def _faults(self) -> Iterator[Fault]:
         for index, (before, after) in enumerate(zip(self.at, self.at[1:], strict=False), start=1):
             if after <= before:
@@ -98,7 +103,7 @@ class Diffusion(Part):
     @property
     def varies(self) -> bool:
         """True if a diffusivity depends on the field."""
-        return any(isinstance(value, DiffusivityCurve) for value in self.diffusivity.values())
+        return any(isinstance(value, DiffusivityCurve) and value.varies for value in self.diffusivity.values())
 
     @property
     def faces(self) -> tuple[tuple[str, Face], ...]:

@@ -23,8 +23,8 @@ A layer takes the mean of the field, and its gradient across the layer: with ζ 
 so that the eigenstrain g a bends the layer by itself to the curvature −g G/h towards its normal. What is left of the
 profile has neither force nor moment.
 
-Where D depends on a, these are the modes for a diffusivity in the middle of its range, and coordinates for the field
-that it has (`engine.varied_diffusion`); all else stays.
+Where D depends on a, these are the modes for the largest diffusivity of each layer, and coordinates for the field that
+it has (`engine.varied_diffusion`); all else stays.
 
 Along a rod of n edges, whose ends are closed, cosines cos(π k (e + ½)/n) of the edges e are eigenvectors of the second
 difference: each k has its own K + q_k Σ D_l M_l, q_k = (2 − 2 cos(π k/n))/Δs², and its own modes.
@@ -59,13 +59,13 @@ class VariedModes:
     """Modes of a field whose diffusivity depends on it, at Gauss points through its layers."""
 
     amplitude: Array  # γ, shape (n_mode,)
+    rate: Array  # λ [1/s], shape (n_mode,)
     value: Array
     slope: Array
     """`value`, `slope`: v and ∂v/∂z [1/m], shape (n_point, n_mode)."""
     weight: Array  # S dz of points [m], shape (n_point,)
-    exchange: Array  # Σ h S v vᵀ of faces, shape (n_mode, n_mode)
-    curve: Array  # The layer of each point, shape (n_point,)
-    curves: list[tuple[Array, Array]]  # Values of the field, and diffusivities there [m²/s], of each layer
+    curve: Array  # the curve of each point, shape (n_point,)
+    curves: list[tuple[Array, Array]]  # values of the field, and diffusivities there [m²/s], of each layer that varies
 
 
 @dataclass(frozen=True)
@@ -205,7 +205,7 @@ class FieldModes:
         means, gradients = np.zeros((len(layers), points)), np.zeros((len(layers), points))
         for slot, layer in enumerate(layers):
             own = slice(degree * slot, degree * (slot + 1) + 1)
-            content, diffusivity = field.partition**slot, float(np.mean(_curve(field.diffusivity[layer.name])[1]))
+            content, diffusivity = field.partition**slot, float(_curve(field.diffusivity[layer.name])[1].max())
             part = 0.5 * layer.thickness * content * own_mass
             mass[own, own] += part
             stiffness[own, own] += 2.0 / layer.thickness * content * diffusivity * own_stiffness
@@ -245,21 +245,17 @@ class FieldModes:
         coefficients = np.linalg.inv(legendre.legvander(_element(degree)[0], degree))
         shapes = legendre.legvander(zeta, degree) @ coefficients
         slopes = legendre.legvander(zeta, degree - 1) @ legendre.legder(coefficients)
-        own = [modes[degree * slot : degree * (slot + 1) + 1] for slot in range(len(layers))]
-        exchange = np.zeros((len(self.times), len(self.times)))
-        for key, face in field.faces:
-            if face.exchange is not None:
-                at, content = (0, 1.0) if key == "bottom" else (-1, field.partition ** (len(layers) - 1))
-                exchange += content * face.exchange * np.outer(modes[at], modes[at])
-        thickness = [layer.thickness for layer in layers]
+        slots = [n for n, of in enumerate(layers) if np.ptp(_curve(field.diffusivity[of.name])[1]) > 0.0]
+        own = [modes[degree * slot : degree * (slot + 1) + 1] for slot in slots]
+        thickness = [layers[slot].thickness for slot in slots]
         return VariedModes(
             amplitude=self.amplitude,
+            rate=1.0 / self.times,
             value=np.concatenate([shapes @ of for of in own]),
             slope=np.concatenate([2.0 / h * (slopes @ of) for h, of in zip(thickness, own, strict=True)]),
-            weight=np.concatenate([0.5 * h * field.partition**slot * weight for slot, h in enumerate(thickness)]),
-            exchange=exchange,
-            curve=np.repeat(np.arange(len(layers)), GAUSS_POINTS),
-            curves=[_curve(field.diffusivity[layer.name]) for layer in layers],
+            weight=np.concatenate([0.5 * layers[n].thickness * field.partition**n * weight for n in slots]),
+            curve=np.repeat(np.arange(len(slots)), GAUSS_POINTS),
+            curves=[_curve(field.diffusivity[layers[slot].name]) for slot in slots],
         )
 
     def _steady(self, stiffness: Array, given: Array, outside: Array) -> Array:

@@ -59,7 +59,7 @@ class Controls:
                 f"stimulus {channel!r}: {value} is not allowed; it must be from {allowed.minimum:g} "
                 f"to {allowed.maximum:g} (unit {allowed.unit})"
             )
-        self._override(list(scene.stimuli).index(channel), f"stimulus {channel!r}", accepted, over, shape)
+        self._override(list(scene.stimuli).index(channel), ("stimulus", channel), accepted, over, shape)
         self.note(STIMULUS, channel, math.nan if accepted is None else accepted, *values_of_ramp(over, shape))
 
     def set_load(self, name: str, factor: float | None, *, over: float = 0.0, shape: str = LINEAR) -> None:
@@ -71,7 +71,7 @@ class Controls:
             raise InputError(f"load {name!r}: no such load; the scene {scene.name!r} has: {known}")
         if factor is not None and not math.isfinite(factor):
             raise InputError(f"load {name!r}: a factor of {factor} is not allowed; it must be finite")
-        if self._override(len(scene.stimuli) + names.index(name), f"load {name!r}", factor, over, shape):
+        if self._override(len(scene.stimuli) + names.index(name), ("load", name), factor, over, shape):
             self._state.has_history.fill(0.0)  # accelerations jump with a load
         self.note(LOAD, name, math.nan if factor is None else float(factor), *values_of_ramp(over, shape))
 
@@ -97,14 +97,17 @@ class Controls:
             self._state.has_history.fill(0.0)  # accelerations jump
         self.note(POSE, name, *values_of_pose(position, quaternion, over))
 
-    def _override(self, index: int, what: str, value: float | None, over: float, shape: str) -> bool:
-        """Set a row of `State.override`; whether anything jumps."""
+    def _override(self, index: int, what: tuple[str, str], value: float | None, over: float, shape: str) -> bool:
+        """Set a row of `State.override` for a kind and a name of input; whether anything jumps."""
+        fault = ""
         if not (math.isfinite(over) and over >= 0.0):
-            raise InputError(f"{what}: over = {over} is not allowed; it must be a number of seconds from 0 up")
-        if shape not in SHAPES:
-            raise InputError(f"{what}: shape = {shape!r} is not allowed; it must be one of {', '.join(SHAPES)}")
-        if over > 0.0 and value is None:
-            raise InputError(f"{what}: over = {over:g} s needs a value to get to; a schedule acts at once")
+            fault = f"over = {over} is not allowed; it must be a number of seconds from 0 up"
+        elif shape not in SHAPES:
+            fault = f"shape = {shape!r} is not allowed; it must be one of {', '.join(SHAPES)}"
+        elif over > 0.0 and value is None:
+            fault = f"over = {over:g} s needs a value to get to; a schedule acts at once"
+        if fault:
+            raise InputError(f"{what[0]} {what[1]!r}: {fault}")
         row, present = self._state.override[index], self._stepper.surroundings.present(self._state, index)
         if value is not None and over > self._stepper.same_time:
             row[:] = ramp_to(value, present, float(self._state.time[0]), over, shape == SMOOTH)

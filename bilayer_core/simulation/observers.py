@@ -66,6 +66,8 @@ class Schedule:
 
     def next_due(self) -> float:
         """Return the next time at which an observer is due [s], after the present one; infinity without observers."""
+        if not self._observers:
+            return math.inf
         self._until = self._simulator.time
         return min((next_due(of, self._until) for of in self._observers), default=math.inf)
 

@@ -38,6 +38,8 @@ GROWTH = math.log(100.0)
 FIRST_LOOK, MOST_STEPS = 8, 256
 """Steps to the first look, and the most between two; until then each comes after twice as many. A look costs two steps
 or three."""
+PARTS_OF_RUNS = 4
+"""How many times as often a look comes where runs end before the scene does, as they do under a controller."""
 LONGEST_PART = 0.125
 """Of the duration of the scene, after which the next look comes however few steps have been made: where almost nothing
 moves they are long."""
@@ -105,8 +107,10 @@ class PlaneWatch:
         """Count more steps, up to a time [s], of which the `last` of a run may be one; return whether to look now."""
         self._done += steps
         self._since_look += steps
-        enough = self._since_look >= (FIRST_LOOK if last else self._next) or time >= self.due
-        return enough and self.since is None
+        least = self._next
+        if last:
+            least = FIRST_LOOK if time >= self._duration else max(FIRST_LOOK, self._next // PARTS_OF_RUNS)
+        return self.since is None and (self._since_look >= least or time >= self.due)
 
     def look(self, state: State, load_factor: Array) -> None:
         """Look at a state under the factors of loads that act there."""

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -77,6 +76,22 @@ def wall_time() -> float:
     return clock.perf_counter() - loading.wall
 
 
+class Timed:
+    """Context that a run loop takes the time of; made for each few steps, so it is no generator, which takes longer."""
+
+    __slots__ = ("_cpu", "_loaded", "_loop", "_wall")
+
+    def __init__(self, loop: RunLoop) -> None:
+        self._loop = loop
+
+    def __enter__(self) -> None:
+        self._cpu, self._wall, self._loaded = clock.thread_time(), wall_time(), loading.cpu
+
+    def __exit__(self, *failure: object) -> None:
+        cpu, wall = clock.thread_time() - self._cpu, wall_time() - self._wall
+        self._loop.take_times(cpu, wall, loading.cpu - self._loaded)
+
+
 class RunLoop:
     """Makes the steps of a run, counts them, and shows them to those who look.
 
@@ -94,7 +109,6 @@ class RunLoop:
 
     Attributes
     ----------
-    statistics : RunStatistics
     termination : str
         How the last run ended (`Termination`).
     cpu_time, wall_time : float
@@ -118,13 +132,19 @@ class RunLoop:
         self.start_over()
 
     @property
+    def statistics(self) -> RunStatistics:
+        """Figures of the run up to now."""
+        self._statistics.take_extrema(self._stepper)
+        return self._statistics
+
+    @property
     def _time(self) -> float:
         return float(self._state.time[0])
 
     def start_over(self) -> None:
         """Count from the present state on."""
         height = float(center_of_mass(self._stepper.model, self._state)[2])
-        self.statistics = RunStatistics(com_max_height=height)
+        self._statistics = RunStatistics()
         self._stepper.engine.start_over(height)
         self.termination = Termination.COMPLETED.value
         self.cpu_time = self.wall_time = 0.0
@@ -135,7 +155,7 @@ class RunLoop:
     def take_state(self) -> None:
         """Evaluate a state to which no step has led, and begin extrema and budget with it."""
         self._stepper.evaluate(self._state)
-        self.statistics.take_shape(self._stepper, self._state)
+        self._statistics.take_shape(self._stepper, self._state)
         self._stepper.begin_budget(self._state)
 
     def compile(self) -> float:
@@ -149,19 +169,17 @@ class RunLoop:
             self._compile_time = clock.thread_time() - begin
         return self._compile_time
 
-    @contextmanager
-    def timed(self) -> Iterator[None]:
+    def timed(self) -> Timed:
         """Count what is done while this lasts as time of the simulation, and the loading of kernels as that of
         compilation.
         """
-        cpu, wall, loaded = clock.thread_time(), wall_time(), loading.cpu
-        try:
-            yield
-        finally:
-            loaded = loading.cpu - loaded
-            self._compile_time = (self._compile_time or 0.0) + loaded
-            self.cpu_time += clock.thread_time() - cpu - loaded
-            self.wall_time += wall_time() - wall
+        return Timed(self)
+
+    def take_times(self, cpu: float, wall: float, loaded: float) -> None:
+        """Add CPU and elapsed seconds of the simulation, and CPU seconds for the loading of kernels among them."""
+        self._compile_time = (self._compile_time or 0.0) + loaded
+        self.cpu_time += cpu - loaded
+        self.wall_time += wall
 
     def step(self, until: float, whole: bool) -> StepReport:
         """Advance by one step, or by one part of it unless it is to be a `whole` one; see `Simulator.step`."""
@@ -183,16 +201,16 @@ class RunLoop:
             self._controls.note_end(until)
         if self._plane_watch is not None:
             most = min(most, self._plane_watch.steps_left)
-        due = min((attached.next_due() for attached in self.attached), default=math.inf)
+        due = min([attached.next_due() for attached in self.attached], default=math.inf)
         look = min(self._strips_due, self._plane_watch.due if self._plane_watch is not None else math.inf)
         with self.timed():
-            begin = Capture(stepper, state) if stepper.reach(state) >= due else None
+            begin = Capture(stepper, state) if due < math.inf and stepper.reach(state) >= due else None
             try:
                 found = stepper.integrate(state, most, until, min(due, look), interrupted)
             except SimulationError:
                 self.termination = Termination.FAILED.value
                 raise
-            self.statistics.update(found, int(state.step[0] - before), stepper)
+            self._statistics.update(found, int(state.step[0] - before))
         self._show_due(begin)
         self._look_out(found.done)
         self._look_at_strips(found.done)
@@ -226,14 +244,15 @@ class RunLoop:
         self._since_look += steps
         if not len(self._stepper.model.flattening.joint):
             return
-        if not last and self._since_look < STEPS_TO_LOOK and self._stepper.reach(self._state) < self._strips_due:
+        many = self._since_look >= STEPS_TO_LOOK or self._stepper.reach(self._state) >= self._strips_due
+        if not (self._since_look if last else many):
             return
         self._since_look, self._looked = 0, self._time
         with self.timed():
             found = folds(self._stepper.model, self._state)
         for name, shape in found.items():
             if shape == "creased":
-                self.statistics.creased.setdefault(name, self._time)
+                self._statistics.creased.setdefault(name, self._time)
             if shape == "folded":
                 self.termination = Termination.FAILED.value
                 raise SimulationError(f"rods.{name} {FOLDS}; {NO_FOLD}", self._time)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -651,11 +651,12 @@ class Simulator:
             self.compile()
             differentiable = DifferentiableRun(self._stepper, self._state, self._builders, self.description)
             each_step = differentiable.keeping(each_step)
-        with ExitStack() as bar:
-            if progress is True:
-                end = self.time + time_left(self.time, self.scene.duration, duration, until)
-                progress = bar.enter_context(progress_bar(self.scene.name, self.time, end))
-            callbacks = Callbacks(stop, interrupted, progress or None, each_step)
+        bar: AbstractContextManager[Any] = nullcontext(progress)
+        if progress is True:
+            end = self.time + time_left(self.time, self.scene.duration, duration, until)
+            bar = progress_bar(self.scene.name, self.time, end)
+        with bar as shown:
+            callbacks = Callbacks(stop, interrupted, shown or None, each_step)
             result = self._loop.run(self, duration, until, observers, inputs, callbacks)
         if log is None and differentiable is None:
             return result

@@ -37,7 +37,8 @@ class BodyContact:
 
 @dataclass
 class RunStatistics:
-    """Counts, extrema and first contacts of a run, from `update` after every few steps.
+    """Counts, extrema and first contacts of a run: the former from `update` after every few steps, the others from
+    `take_extrema` when somebody asks for them.
 
     Times in s, lengths in m, forces in N, residuals in m/s, curvatures in 1/m. `max_strain` is the largest magnitude of
     the strain of an edge without its eigenstrain, `max_fibre_strain` that of the fibre strained most, and
@@ -99,18 +100,15 @@ class RunStatistics:
         stepper.engine.count_shape(state)
         stepper.engine.open_account(state)
         self.numerical_before = float(state.account[NUMERICAL])
-        self._take_extrema(stepper)
 
-    def update(self, report: IntegrationReport, whole: int, stepper: Stepper) -> None:
-        """Take in some steps.
+    def update(self, report: IntegrationReport, whole: int) -> None:
+        """Count some steps.
 
         Parameters
         ----------
         report : IntegrationReport
         whole : int
             How many of the steps are no parts of one.
-        stepper : Stepper
-            Which made them.
         """
         self.steps += whole
         self.substeps += report.done
@@ -119,15 +117,25 @@ class RunStatistics:
         self.gaining += report.gaining
         self.unresolved += report.unresolved
         self.regularised += report.regularised
-        self.shortest, self.longest = min(self.shortest, report.shortest), max(self.longest, report.longest)
+        if report.shortest < self.shortest:
+            self.shortest = report.shortest
+        if report.longest > self.longest:
+            self.longest = report.longest
         self.iterations += report.iterations
         self.factorisations += report.factorisations
         self.settlings += report.settlings
         self.last_residual = report.largest_residual if report.failed else report.residual
-        self.largest_residual = max(self.largest_residual, report.largest_residual)
-        self._take_extrema(stepper)
+        if report.largest_residual > self.largest_residual:
+            self.largest_residual = report.largest_residual
 
-    def _take_extrema(self, stepper: Stepper) -> None:
+    def take_extrema(self, stepper: Stepper) -> None:
+        """Take in the extrema of all steps.
+
+        Parameters
+        ----------
+        stepper : Stepper
+            Which made them.
+        """
         extrema, model = stepper.engine.extrema, stepper.model
         found = stepper.engine.numbers_of_extrema.read()
         self.com_max_height, self.min_gap = found["height"], found["least_gap"]

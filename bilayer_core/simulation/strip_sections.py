@@ -140,7 +140,10 @@ def folds(model: Model, state: State) -> dict[str, str]:
     if not model.flattening.exists:
         return found
     rest, strains, inside = _rest(model, state), _strains(model, state), _inside(model)
-    _, twist, across = natural = _natural(model, rest)
+    along, twist, across = natural = _natural(model, rest)
+    x = model.flattening.scale * np.max([np.hypot(*strains), np.hypot(along, twist), np.abs(across)], axis=0)
+    if x[inside].max(initial=0.0) < CONVEX:
+        return found
     for strand in model.strands:
         own = _joints_of(model, strand)
         if _jumps(model, rest, natural, strains, own[inside[own]]):
@@ -181,9 +184,6 @@ def _jumps(
     length = model.voronoi_length[joint][:, None]
     strain, free = (np.stack([of[own] for of in values], axis=1) / length for values in (strains, natural))
     sizes = [np.hypot(*of.T[:2]) for of in (free, strain)]
-    x = model.flattening.scale[own] * length[:, 0] * np.max([*sizes, np.abs(free[:, 2])], axis=0)
-    if x.max(initial=0.0) < CONVEX:
-        return False
     step, size = np.diff(strain, axis=0), next((of.max() for of in sizes if of.any()), 0.0)
     alike = np.abs(np.diff(free, axis=0)).max(axis=1, initial=0.0) <= JUMP * size
     far = np.flatnonzero((np.hypot(*step.T) > JUMP * size) & alike)

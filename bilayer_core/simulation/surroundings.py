@@ -91,18 +91,16 @@ class Surroundings:
     def _spans_about(self, time: float, afresh: bool = False) -> Actuation:
         schedules = zip([*self._channels, *self._loads], self._override.tolist(), strict=True)
         rows = [_next_spans(*of, time - self._ahead, time + self._ahead) for of in schedules]
-        size = max((len(row) for row in rows), default=0)
-        size = max(size, SPANS_AT_ONCE)  # so that it seldom changes
-        padded = [row + [row[-1]] * (size - len(row)) for row in rows]
-        table = np.array(padded).reshape(len(rows), size, len(Span._fields))
-        stimulus, load = np.split(table, [len(self._channels)])
-        horizon = min((row[-1].until for row in rows), default=math.inf)
+        size = max([SPANS_AT_ONCE, *map(len, rows)])  # so that it seldom changes
         present = self.actuation
-        if afresh or present is None or present.stimulus.shape != stimulus.shape or present.load.shape != load.shape:
-            return Actuation(
-                stimulus=stimulus, load=load, ranges=self._ranges, horizon=np.array([horizon]), paths=self._paths
+        if afresh or present is None or present.stimulus.shape[1] != size:
+            stimulus, load = (np.zeros((len(of), size, len(Span._fields))) for of in (self._channels, self._loads))
+            present = Actuation(
+                stimulus=stimulus, load=load, ranges=self._ranges, horizon=np.zeros(1), paths=self._paths
             )
-        present.stimulus[:], present.load[:], present.horizon[0] = stimulus, load, horizon
+        present.horizon[0] = min([row[-1].until for row in rows], default=math.inf)
+        for place, row in zip([*present.stimulus, *present.load], rows, strict=True):
+            place[: len(row)], place[len(row) :] = row, row[-1]
         return present
 
 

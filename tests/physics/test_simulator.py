@@ -199,6 +199,12 @@ def test_a_scene_that_starts_in_penetration_names_the_node_and_the_depth():
         Simulator(load_scene(sunk))
 
 
+def test_a_start_in_penetration_because_of_a_missing_unit_asks_for_the_unit():
+    sunk = scene([rod([layer()], length=40, start=(0, 0, 0.4e-3))], obstacles=[GROUND], contact=contact())
+    with pytest.raises(PenetrationError, match=r"behind the surface of ground.*rods\.rod is 40 m long: is the unit"):
+        Simulator(load_scene(sunk))
+
+
 def test_a_simulator_is_made_of_what_names_a_scene_as_well():
     assert Simulator("bending").scene == load_scene("bending")
     with pytest.raises(SceneError, match="bendin"):

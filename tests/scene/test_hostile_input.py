@@ -24,16 +24,16 @@ BOMB = "a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
     f"{name}: &{name} [{', '.join(['*' + last] * 9)}]\n" for last, name in zip("abcdefghi", "bcdefghij", strict=True)
 )
 LONGEST = 10.0
-"""Time until an answer [s]."""
+"""CPU time until an answer [s]."""
 LONGEST_LINE = 1000
 """Of a message [characters]."""
 
 
 def refusal(data, overrides=()):
-    begin = time.monotonic()
+    begin = time.process_time()
     with pytest.raises(SceneError) as refused:
         load_scene(data, overrides)
-    assert time.monotonic() - begin < LONGEST
+    assert time.process_time() - begin < LONGEST
     return str(refused.value)
 
 
@@ -181,7 +181,6 @@ def test_a_path_of_many_turns_on_each_other_is_refused_in_time_and_memory(turns,
     assert reason in refusal(scene([rod([layer()]) | {"path": arc}]))
 
 
-@pytest.mark.verify
 def test_as_many_elements_as_a_light_may_have_are_built_in_time():
     light = {"sun": {"light": {"from": [0, 0, 1], "shadow": True}, "schedule": {"type": "hold", "value": 1.0}}}
     sheet = layer(eigenstrain={"stimulus": "sun", "gain": 0.01, "time_constant": 1.0})
@@ -271,9 +270,9 @@ def test_a_table_that_is_a_directory_or_too_large_is_refused(tmp_path):
 def test_the_largest_table_is_read_in_time(tmp_path):
     lines = "".join(f"{k},0.5\n" for k in range(250_000))
     (tmp_path / "lamp.csv").write_text("time,value\n" + lines)
-    begin = time.monotonic()
+    begin = time.process_time()
     assert len(load_scene(with_table(tmp_path, "lamp.csv")).stimuli["lamp"].schedule.values) == 250_000
-    assert time.monotonic() - begin < LONGEST
+    assert time.process_time() - begin < LONGEST
 
 
 @pytest.mark.parametrize("value", ["name\nname", "a\r\nb", "x\u2028y", "tab\there", "\x1b[31mred"])

@@ -13,19 +13,18 @@ class VariedFields:
 
     number: Indices  # of each field among these, −1 of all others, shape (n_field,)
     point: Indices  # first point of each, last the number of all, shape (n_varied + 1,)
-    entry: Indices  # first value of v and v′ of each, shape (n_varied,)
-    square: Indices  # first value of its `exchange`, likewise
-    tolerance: Vector  # of a step [unit of the stimulus], likewise
-    amplitude: Vector  # γ of modes, shape (n_mode,)
-    value: Vector  # v of modes at points, point after point
-    slope: Vector  # ∂v/∂z [1/m], likewise
+    tolerance: Vector  # largest norm of a step's error in q, shape (n_varied,)
+    amplitude: Matrix  # γ of modes, shape (n_varied, n_mode), zero beyond those of a field
+    rate: Matrix  # λ [1/s], likewise
+    value: Matrix  # v of modes at points, shape (n_point, n_mode)
+    slope: Matrix  # ∂v/∂z [1/m], likewise
     weight: Vector  # S dz of points [m], shape (n_point,)
-    exchange: Vector  # Σ h S v vᵀ of faces, shape (n_own, n_own) of each field
     curve: Indices  # diffusivity of each point, shape (n_point,)
     curve_first: Indices  # first place of each curve, last the number of all, shape (n_curve + 1,)
     curve_at: Vector  # value of the field, increasing along a curve
-    curve_value: Vector  # diffusivity there [m²/s]
-    matrix: Matrix = ("varied mode", "varied mode")
+    curve_lack: Vector  # what the diffusivity there lacks to the largest of its layer, D₀ − D [m²/s]
     present: Vector = ("varied mode",)  # q at the start of a step of the field
     moved: Vector = ("varied mode",)
+    change: Vector = ("varied mode",)  # q′ [1/s times q]
+    span: Vector = ("varied mode",)  # (1 − exp(−λ h))/λ [s]
     level: Matrix = ("level", "varied mode")
