@@ -21,7 +21,11 @@ from bilayer_core.errors import InputError
     help="Stimulus at which each target is wanted, in their order; by default the largest.",
 )
 @click.option(
-    "--vary", multiple=True, required=True, metavar="PATH=LO:HI[:POINTS]", help="A number, or a profile along the rod."
+    "--vary",
+    multiple=True,
+    required=True,
+    metavar="PATH=LO:HI[:POINTS]",
+    help="A number, or a profile along the rod; PATH=V,V,…[:PIECES] for these values alone.",
 )
 @click.option("--smoothness", type=click.FloatRange(min=0.0), help="Weight of roughness of patterns; default: 1e-3.")
 @set_option

@@ -23,3 +23,8 @@ def take_shape(simulator: Simulator, found: Equilibrium) -> None:
     simulator.compile()
     found.write_shape(simulator._state)
     simulator._loop.take_state()
+
+
+def look_no_more(simulator: Simulator) -> None:
+    """Let a robot look no more out of its plane, which costs more than a short run and which no study tells of."""
+    simulator.plane_watch = simulator._loop._plane_watch = None

@@ -144,7 +144,7 @@ def test_what_cannot_be_told_apart_ends_with_1_and_writes_nothing(here, capsys):
 
 
 def test_a_fit_that_has_not_converged_ends_with_1_and_writes_what_it_has(here, capsys, monkeypatch):
-    monkeypatch.setattr("bilayer_core.studies.fitting.fit.MOST_EVALUATIONS", 1)
+    monkeypatch.setattr("bilayer_core.studies.fitting.descent.MOST_EVALUATIONS", 1)
     assert fitted(*ASKED[2:], "--json", "early.json", "--quiet") == 1
     assert "not converged after as many evaluations as a fit may make" in capsys.readouterr().out
     assert json.loads((here / "early.json").read_text())["converged"] is False

@@ -82,6 +82,30 @@ def test_thickness_of_a_layer_is_a_pattern_too():
     assert found.values[0] == pytest.approx([1.3e-3], rel=1e-2)
 
 
+def test_pieces_of_a_palette_that_made_a_shape_are_found():
+    made = [0.0, 0.02, -0.02, 0.02, 0.02, 0.0, -0.02, 0.0]
+    ends = np.repeat(np.linspace(0.0, LENGTH, 9), 2)[1:-1] + np.tile([1e-6, -1e-6], 8)
+    wanted = curve_of(HANGING | {GAIN: {"at": ends.tolist(), "value": np.repeat(made, 2).tolist()}})
+    found = design("bending", wanted, [f"{GAIN}=2%,-2%,0:8"], overrides=HANGING)
+    assert found.values[0].tolist() == pytest.approx(made)
+    assert found.largest < 1e-3 and found.at_bounds == 0
+
+
+def test_pieces_of_two_materials_come_near_a_shape_that_needs_others(drawn):
+    found = design("bending", drawn, {GAIN: ([-0.05, 0.05], 50)}, overrides=HANGING)
+    assert set(found.values[0]) == {-0.05, 0.05}
+    assert found.rms < 0.01
+    gain = found.scene.rods[0].layers[1].eigenstrain[0].gain
+    assert np.abs(curve_of(HANGING | {GAIN: {"at": gain.at, "value": gain.value}}) - found.shapes[0].made).max() < 1e-9
+
+
+def test_a_layer_takes_the_film_next_to_the_thickness_that_is_best():
+    path = "rods.strip.layers.active.thickness"
+    found = design("bending", curve_of({path: 1.3e-3}), [f"{path}=1mm,1.25mm,2mm"])
+    assert found.values[0] == pytest.approx([1.25e-3])
+    assert "without it" in found.termination
+
+
 def test_an_error_of_one_percent_moves_the_rod_as_reported(drawn):
     found = design("bending", drawn, {GAIN: (-0.05, 0.05, 20)}, overrides=HANGING)
     own = found.scene.rods[0].layers[1].eigenstrain[0].gain
@@ -140,6 +164,9 @@ def straight(length, direction=(1.0, 0.0, 0.0)):
         (straight(0.1), {}, "vary: nothing is given"),
         (straight(0.1), {GAIN: (0.1, -0.1)}, "the lower bound 0.1 must be below the upper one"),
         (straight(0.1), {GAIN: (-0.1, 0.1, 1)}, "1 points are not allowed; it must be a whole number from 2 up"),
+        (straight(0.1), [f"{GAIN}=1%,1%:9"], "a palette must have two values or more"),
+        (straight(0.1), [f"{GAIN}=1%,thick:9"], "gain: .*thick"),
+        (straight(0.1), [f"{GAIN}=1%,2%:9:3"], "must be PATH=LO:HI, .* or PATH=V,V,…:PIECES"),
         (straight(0.1), {"gravity.2": (-1.0, 1.0, 5)}, "points need a number of a rod"),
         (straight(0.1), {"rods.strip.layers.active.gain": (0, 1)}, "vary rods.strip.layers.active.gain: there is no"),
         ([straight(0.1)] * 2, {GAIN: (-0.1, 0.1)}, "2 curves need values of stimuli each, 0 are given"),

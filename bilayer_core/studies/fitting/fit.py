@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import OptimizeResult, least_squares
 from scipy.special import chdtrc
 
 from bilayer_core.errors import BilayerError, InputError
@@ -17,6 +15,7 @@ from bilayer_core.scene.loader import load_scene, scene_content
 from bilayer_core.scene.overrides import Overrides
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.studies.fitting.data import Data, read_data, with_sigma
+from bilayer_core.studies.fitting.descent import Descent, descend
 from bilayer_core.studies.fitting.differences import jacobian
 from bilayer_core.studies.fitting.fit_result import FitResult, Fitted
 from bilayer_core.studies.fitting.identify import refuse_undetermined, refuse_unseen, refuse_without_influence
@@ -26,12 +25,6 @@ from bilayer_core.studies.fitting.parameters import Parameter, Parameters, read_
 from bilayer_core.studies.fitting.runs import Runs, check_times, known_quantities
 
 Array = np.ndarray
-SMALLEST_CHANGE = 1e-8
-"""Of parameters, in parts of the way between bounds, and of the sum of squares, relative: smaller ones end a fit."""
-SMALLEST_SLOPE = 1e-12
-"""Of half the sum of weighted squares over the way between bounds."""
-MOST_EVALUATIONS = 200
-"""Of the sum of squares, those for derivatives not counted."""
 AT_BOUND = 1e-4
 """Part of the way between bounds within which a parameter that the data draw to a bound is at it."""
 DOUBTFUL = 0.01
@@ -108,15 +101,6 @@ def _refuse_few(data: Data, parameters: Sequence[Parameter]) -> None:
         raise InputError(f"{data.source}: holds {count} values, fewer than needed for this fit: {needed}{why}")
 
 
-@dataclass(frozen=True)
-class _Point:
-    """Where a search is: parts, weighted residuals and their Jacobian."""
-
-    parts: Array
-    residuals: Array
-    matrix: Array
-
-
 class _Search:
     """The state of one fit."""
 
@@ -142,18 +126,8 @@ class _Search:
         matrix = self._jacobian(start)
         refuse_without_influence(self._parameters, matrix)
         self._refuse_unseen(start, matrix, "at the start")
-        found = least_squares(
-            self._objective,
-            start,
-            self._derivatives,
-            bounds=(0.0, 1.0),
-            method="trf",
-            x_scale=1.0,
-            xtol=SMALLEST_CHANGE,
-            ftol=SMALLEST_CHANGE,
-            gtol=SMALLEST_SLOPE,
-            max_nfev=MOST_EVALUATIONS,
-        )
+        known = self._data.sigma is not None
+        found = descend(self._objective, self._derivatives, start, 1.0 if known else None)
         return self._concluded(found, started)
 
     def _residuals(self, values: Array) -> Array:
@@ -186,9 +160,8 @@ class _Search:
         rough = f"; {ROUGH}: {SMOOTHER}" if self._noise > RESOLVED else ""
         refuse_unseen(self._parameters, parts, matrix, shares(self._steps, self._observed.size), where, rough)
 
-    def _concluded(self, found: OptimizeResult, started: Array) -> FitResult:
-        parts = found.x
-        at = _Point(parts, self._objective(parts), self._jacobian(parts))
+    def _concluded(self, at: Descent, started: Array) -> FitResult:
+        parts = at.parts
         self._refuse_unseen(parts, at.matrix, "at the solution")
         known = self._data.sigma is not None
         whole = spread_of(at.matrix, at.residuals, known, self._noise)  # what is at a bound may be so by chance
@@ -199,12 +172,11 @@ class _Search:
         if free:
             spread = spread_of(at.matrix[:, free], at.residuals, known, self._noise)
             correlations[np.ix_(free, free)] = spread.correlations
-        return self._result(found, at, bounds, free, spread, correlations, started)
+        return self._result(at, bounds, free, spread, correlations, started)
 
     def _result(
         self,
-        found: OptimizeResult,
-        at: _Point,
+        at: Descent,
         bounds: list[str],
         free: list[int],
         spread: Spread | None,
@@ -230,8 +202,8 @@ class _Search:
             chi_squared=squares if known else None,
             probability=probability,
             numerical_noise=self._noise / noise if noise > 0.0 else float("inf"),
-            converged=found.status > 0,
-            termination=_TERMINATIONS[found.status],
+            converged=at.converged,
+            termination=at.termination,
             iterations=self._iterations,
             runs=self._runs.count,
             refused=refused,
@@ -274,16 +246,6 @@ class _Search:
         return found
 
 
-_TERMINATIONS = {
-    0: "not converged after as many evaluations as a fit may make",
-    1: "the gradient is 0",
-    2: "the sum of squares changes no more",
-    3: "the parameters change no more",
-    4: "neither the sum of squares nor the parameters change any more",
-}
-"""By the status of `scipy.optimize.least_squares`."""
-
-
 def _weights(data: Data) -> Array:
     """Return the weights of residuals, shape (times, columns), 0 where data are missing: 1/σ, or if that is not known
     1/spread of all.
@@ -296,7 +258,7 @@ def _weights(data: Data) -> Array:
     return np.where(present, 1.0 / (spread or largest or 1.0), 0.0)
 
 
-def _bounds_at(at: _Point) -> list[str]:
+def _bounds_at(at: Descent) -> list[str]:
     """Return at which bound each parameter is, if the sum of squares gets smaller beyond it."""
     slope = at.matrix.T @ at.residuals
     lower = (at.parts <= AT_BOUND) & (slope > 0.0)

@@ -38,6 +38,9 @@ AROUND = 10.0
 """A step is at most this factor below the spacing at which the noise was measured."""
 LARGEST_STEP = 0.1
 """Part of the way between the bounds."""
+ENOUGH, LEVEL = 1e-4, 4.0
+"""Noise over the changes in a table, and how many times as large fourth and fifth differences tell it at most [1], for
+which no finer table is made."""
 SEEN = 4.0
 """How much larger third differences must be than noise makes them, to tell a third derivative."""
 DIGITS = 4.0 * float(np.finfo(float).eps)
@@ -71,6 +74,7 @@ class _Roughness:
     noise: float
     third: float
     resolved: bool
+    is_enough: bool
 
     def step(self) -> Step:
         """Return the step with the smallest error."""
@@ -103,10 +107,11 @@ def choose_steps(runs: Runs, start: Array, weights: Array) -> list[Step]:
         values = iter(runs.demand([point for row in rows.values() for point in row]))
         for k, row in rows.items():
             found = _of_table(np.array([next(values) for _ in row]), spacing, weights)
-            if k in best and found.noise / spacing >= best[k].noise / best[k].spacing:
-                sought.remove(k)
-            else:
+            is_rougher = k in best and found.noise / spacing >= best[k].noise / best[k].spacing
+            if not is_rougher:
                 best[k] = found
+            if is_rougher or found.is_enough:
+                sought.remove(k)
     return [_with_third(runs, start, k, best[k], weights).step() for k in range(start.size)]
 
 
@@ -124,11 +129,12 @@ def _row(start: Array, k: int, spacing: float, places: Sequence[int]) -> list[Ar
 def _of_table(values: Array, spacing: float, weights: Array) -> _Roughness:
     """Return the roughness of a table of shape (points, times, columns)."""
     table = _weighted(values, weights)
-    order = len(TABLE) - 1
-    noise = _root_mean_square(np.diff(table, n=order, axis=0)) / sqrt(comb(2 * order, order))
-    noise = max(noise, DIGITS * _root_mean_square(table))
+    orders = range(len(TABLE) - 1, len(TABLE) - 4, -1)
+    levels = [_root_mean_square(np.diff(table, n=n, axis=0)) / sqrt(comb(2 * n, n)) for n in orders]
+    noise = max(levels[0], DIGITS * _root_mean_square(table))
+    is_enough = max(levels) <= LEVEL * noise <= LEVEL * ENOUGH * _root_mean_square(np.diff(table, axis=0))
     third = _root_mean_square(np.diff(table, n=3, axis=0))
-    return _Roughness(spacing, noise, third / spacing**3, third > SEEN * sqrt(comb(6, 3)) * noise)
+    return _Roughness(spacing, noise, third / spacing**3, third > SEEN * sqrt(comb(6, 3)) * noise, is_enough)
 
 
 def _with_third(runs: Runs, start: Array, k: int, found: _Roughness, weights: Array) -> _Roughness:

@@ -13,6 +13,7 @@ from bilayer_core.log.run.quantities import Entry, entries
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.loader import load_scene, scene_content
 from bilayer_core.scene.overrides import Override
+from bilayer_core.simulation.at_rest import look_no_more
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.studies.fitting.data import Data
 from bilayer_core.studies.fitting.parameters import Parameter, told
@@ -139,6 +140,7 @@ class Runs:
             self._simulator.reset(scene)
         else:
             self._simulator = Simulator(scene)
+            look_no_more(self._simulator)
         return self._simulator
 
     def _run(self, simulator: Simulator) -> Array:

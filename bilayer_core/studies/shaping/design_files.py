@@ -13,7 +13,7 @@ import numpy as np
 from bilayer_core.log.file.output_paths import check_output_path, draft_of, write_text
 from bilayer_core.observed.system import versions
 from bilayer_core.scene.loader import scene_text
-from bilayer_core.studies.shaping.shape_search import DesignResult
+from bilayer_core.studies.shaping.design_result import DesignResult
 
 SCENE, PATTERN, REPORT, PICTURE = "designed.yaml", "pattern.csv", "report.json", "design.png"
 WANTED, MADE = "#000000", "#D55E00"
@@ -51,7 +51,12 @@ def report_of(result: DesignResult) -> dict[str, Any]:
             for shape in result.shapes
         ],
         "pattern": {
-            v.path: {"bounds": [v.low, v.high], "at": list(v.at), "value": own.tolist()}
+            v.path: {
+                "bounds": [v.low, v.high],
+                "palette": list(v.palette),
+                "at": list(v.at),
+                "value": v.in_scene(own).tolist(),
+            }
             for v, own in zip(result.varied, result.values, strict=True)
         },
         "versions": versions(),
@@ -80,7 +85,7 @@ def pattern_text(result: DesignResult) -> str:
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(("path", "at", "value"))
     for v, own in zip(result.varied, result.values, strict=True):
-        for at, value in zip(v.at or ("",), own.tolist(), strict=True):
+        for at, value in zip(v.at or ("",), v.in_scene(own).tolist(), strict=True):
             rows.writerow((v.path, at, repr(value)))
     return text.getvalue()
 
@@ -108,7 +113,7 @@ def _write_picture(result: DesignResult, path: Path, force: bool) -> None:
     left.legend(frameon=False, fontsize=7)
     for v, own in zip(result.varied, result.values, strict=True):
         if v.at:
-            right.plot(1e3 * np.array(v.at), own, ".-", linewidth=1.0, markersize=3, label=v.path)
+            right.plot(1e3 * np.array(v.at), v.in_scene(own), ".-", linewidth=1.0, markersize=3, label=v.path)
         else:
             right.axhline(own[0], linewidth=1.0, label=v.path)
     right.set_xlabel("along the rod [mm]", fontsize=8)

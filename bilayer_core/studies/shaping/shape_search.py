@@ -6,22 +6,20 @@ the bounds of p,
     Σ |d_i + ∂d_i/∂p δp|²/L² + w² Σ (second differences of the pattern, in parts of its bounds)²
 
 with d_i the way of station i from the nearest point of the wanted curve (Gauss and Newton). Sliding along the curve
-costs nothing, as a drawn curve does not say how the strip is stretched. A step that makes the distances larger is made
+costs nothing, as a drawn curve does not say how the strip is stretched. A step that makes this sum larger is made
 again with a weight of staying. Far away this is no good: in a plane, the first step takes angles of edges in place of
 distances, in which free strips are linear; in space, wanted shapes are approached through shapes that bend less.
+Values of palettes come last, from the linear problem about the best pattern without them, then about that with them.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.linalg import lstsq
-from scipy.optimize import lsq_linear
 
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.scene.config import SceneConfig
@@ -32,20 +30,22 @@ from bilayer_core.simulation.gains import alike_but_gains
 from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
 from bilayer_core.simulation.gradients.parameters import Parameter
 from bilayer_core.simulation.simulator import Simulator
+from bilayer_core.studies.shaping.design_result import DesignResult, Shape, rod_of
+from bilayer_core.studies.shaping.pattern import Pattern
 from bilayer_core.studies.shaping.target_curve import TargetCurve, between, read_curve
 from bilayer_core.studies.shaping.varied import Varied, Vary, read_varied
 
 Array = np.ndarray
 Target = str | Path | Array
-MOST_STEPS, MOST_TRIALS, MOST_MODELS = 60, 8, 3
+MOST_STEPS, MOST_TRIALS, MOST_MODELS, MOST_PALETTES = 60, 8, 3, 8
 ENOUGH = 1e-6
 """Root mean square of distances, of the length of the rod, at which to end."""
 STALLED = 0.02
-"""Part of that by which one of two steps must make it smaller, else the search ends."""
+"""Part by which one of two steps must make the root of the sum smaller, else the search ends."""
 WEAKEST, STRONGER = 1e-4, 4.0
 """First weight of staying, in parts of the bounds, once a step leads away, and its factor (Levenberg, Marquardt)."""
-SMOOTH, POINTS = 1e-3, 100
-"""w of a pattern of so many points, as the square of their number for others: what is left to choose is smooth."""
+SMOOTH = 1e-3
+"""w of a pattern of `pattern.POINTS` points: what is left to choose is smooth."""
 TURN = 1.0
 """Of the tip, between two shapes on the way to a wanted one in space [rad]."""
 STEEPEST = math.radians(10.0)
@@ -54,100 +54,6 @@ LONGEST = 1.1
 """Length of a wanted curve, of what the rod can become."""
 AT_BOUND = 1e-6
 """Part of the way between bounds."""
-
-
-@dataclass(frozen=True)
-class Shape:
-    """A wanted shape and what became of it.
-
-    Attributes
-    ----------
-    target : TargetCurve
-        Moved to where the rod begins.
-    stimulus : dict of str to float
-        At which it is wanted.
-    made : ndarray
-        The rod's curve [m], shape (n, 3).
-    distances : ndarray
-        From the target [m], shape (n,).
-    length : float
-        Of the rod there [m].
-    stable : bool
-    """
-
-    target: TargetCurve
-    stimulus: dict[str, float]
-    made: Array
-    distances: Array
-    length: float
-    stable: bool
-
-
-@dataclass(frozen=True)
-class DesignResult:
-    """Pattern that a search found, and how near it comes.
-
-    Attributes
-    ----------
-    scene : SceneConfig
-        With the pattern.
-    varied : list of Varied
-    values : list of ndarray
-        Of each of them.
-    shapes : list of Shape
-    at_bounds : int
-        How many values are at their bounds.
-    sensitivity : dict of str to float
-        By layer, the largest displacement by an error of 1 % in its pattern or thickness [m].
-    equilibria : int
-        That were computed.
-    termination : str
-    """
-
-    scene: SceneConfig
-    varied: list[Varied]
-    values: list[Array]
-    shapes: list[Shape]
-    at_bounds: int
-    sensitivity: dict[str, float]
-    equilibria: int
-    termination: str
-
-    @property
-    def size(self) -> float:
-        """Length of the rod at the start [m]."""
-        return self._rod.path.length
-
-    @property
-    def _rod(self) -> Any:
-        return next(rod for rod in self.scene.rods if rod.name == rod_of(self.scene, self.varied))
-
-    @property
-    def largest(self) -> float:
-        """Largest distance, of the length of the rod."""
-        return max(float(shape.distances.max()) for shape in self.shapes) / self.size
-
-    @property
-    def rms(self) -> float:
-        """Root mean square of the distances, of the length of the rod."""
-        return math.sqrt(np.mean([np.mean(shape.distances**2) for shape in self.shapes])) / self.size
-
-    def __str__(self) -> str:
-        lines = [
-            f"{self.scene.name}: {sum(map(len, self.values))} values, {self.equilibria} equilibria; {self.termination}",
-            f"  distance from the target: at most {100 * self.largest:.3g} %, rms {100 * self.rms:.3g} % of the rod",
-        ]
-        for shape in self.shapes:
-            at = ", ".join(f"{name} = {value:g}" for name, value in shape.stimulus.items()) or "no stimulus"
-            lines.append(
-                f"  at {at}: {shape.target.source} is {1e3 * shape.target.length:.4g} mm long, the rod "
-                f"{1e3 * shape.length:.4g} mm; {'stable' if shape.stable else 'UNSTABLE'}"
-            )
-        if self.at_bounds:
-            lines.append(f"  {self.at_bounds} values are at their bounds, which limit the shape")
-        for layer, moved in self.sensitivity.items():
-            lines.append(f"  an error of 1 % in {layer} moves the rod by up to {100 * moved / self.size:.3g} %")
-        return "\n".join(lines)
 
 
 def design(
@@ -170,6 +76,7 @@ def design(
         Csv files with columns x, y and z [m], or arrays of shape (n, 3): the curve of the rod from its start.
     vary : sequence of str or mapping
         ``PATH=LO:HI``, or ``PATH=LO:HI:POINTS`` for a profile along the rod; or (lo, hi) or (lo, hi, points) by paths.
+        ``PATH=V,V,…`` and ``PATH=V,V,…:PIECES``, or ([v, …],) and ([v, …], pieces), allow these values alone.
     at : mapping or list of mappings, optional
         Values of stimuli, for each target; by default the channels' largest.
     overrides : sequence of str or mapping
@@ -205,23 +112,6 @@ def design(
     return _Search(config, varied, curves, levels, smoothness, progress).result()
 
 
-def rod_of(scene: SceneConfig, varied: Sequence[Varied]) -> str:
-    """Return the name of the rod that is shaped: the only one, or that of the first path.
-
-    Raises
-    ------
-    InputError
-        If it is not told which.
-    """
-    names = [name for rod in scene.rods for name in rod.copy_names]
-    if len(names) == 1:
-        return names[0]
-    keys = varied[0].path.split(".")
-    if keys[0] == "rods" and keys[1] in names:
-        return keys[1]
-    raise InputError(f"vary {varied[0].path}: names no single rod, of which there are {', '.join(names)}")
-
-
 class _Search:
     """Steps from equilibrium to equilibrium."""
 
@@ -235,11 +125,11 @@ class _Search:
         progress: Callable[[str], None] | None,
     ):
         self._scene, self._varied, self._levels = scene, varied, levels
-        self._smoothness, self._progress = smoothness, progress
-        self._low = np.concatenate([np.full(len(v.start), v.low) for v in varied])
-        self._high = np.concatenate([np.full(len(v.start), v.high) for v in varied])
+        self._pattern, self._progress = Pattern(varied, smoothness), progress
         self._values = np.concatenate([v.start for v in varied])
         self._names = [name for v in varied for name in v.names]
+        owners = self._pattern.split(np.arange(len(self._values)))
+        self._owner = np.concatenate([v.in_scene(own) for v, own in zip(varied, owners, strict=True)])
         self.equilibria = 0
         self._known: list[Array] = []
         self._here = self._built(self._values)
@@ -266,12 +156,9 @@ class _Search:
 
     def _changes(self, values: Array) -> dict[str, Any]:
         found: dict[str, Any] = {}
-        for v, own in zip(self._varied, self._split(values), strict=True):
+        for v, own in zip(self._varied, self._pattern.split(values), strict=True):
             found |= v.changes(own)
         return found
-
-    def _split(self, values: Array) -> list[Array]:
-        return np.split(values, np.cumsum([len(v.start) for v in self._varied])[:-1])
 
     def _are_laws(self) -> bool:
         """Return whether all values are gains, for which nothing is built."""
@@ -298,7 +185,8 @@ class _Search:
     def _slopes(self) -> list[Array]:
         """Return its derivatives by the values at each level, computed once for each equilibrium."""
         if not self._known:
-            self._known = [self._derivatives(*of) for of in zip(self._here, self._parameters, strict=True)]
+            acts = np.eye(len(self._values))[self._owner]  # what a value changes in the scene
+            self._known = [self._derivatives(*of) @ acts for of in zip(self._here, self._parameters, strict=True)]
         return self._known
 
     def _placed(self, curve: TargetCurve, here: Equilibrium) -> TargetCurve:
@@ -329,7 +217,7 @@ class _Search:
         else:
             for here, parameters in zip(self._here, self._parameters, strict=True):
                 gains = here.gains
-                for parameter, value in zip(parameters, values.tolist(), strict=True):
+                for parameter, value in zip(parameters, values[self._owner].tolist(), strict=True):
                     gains[parameter.laws] = value
                 here.go_to(gains)
                 self.equilibria += 1
@@ -374,75 +262,76 @@ class _Search:
         count = math.sqrt(len(right[0]))
         return np.concatenate(rows) / count, np.concatenate(right) / count
 
-    def _step(self, rows: Array, right: Array, damping: float = 0.0) -> Array:
-        """Return the values that minimise the squares of linear equations, within their bounds."""
-        extent = self._high - self._low
-        rough = [np.zeros((0, len(self._values)))]
-        begin = 0
-        for v in self._varied:
-            count = len(v.start)
-            part = np.zeros((max(count - 2, 0), len(self._values)))
-            part[:, begin : begin + count] = np.diff(np.eye(count), 2, axis=0)
-            begin += count
-            rough.append(self._smoothness * (count / POINTS) ** 2 * part)
-        roughness = np.concatenate(rough)
-        now = (self._values - self._low) / extent
-        held = damping * np.eye(len(now) if damping else 0, len(now))
-        matrix = np.concatenate([rows * extent, roughness, held])
-        wanted = np.concatenate([rows @ (extent * now) - right, np.zeros(len(roughness)), held @ now])
-        q, r = np.linalg.qr(matrix)
-        found = lstsq(r, q.T @ wanted)[0]
-        if not ((found >= 0.0) & (found <= 1.0)).all():
-            found = lsq_linear(r, q.T @ wanted, bounds=(0.0, 1.0), tol=1e-12).x
-        return self._low + extent * np.clip(found, 0.0, 1.0)
+    def _left(self, targets: Sequence[TargetCurve]) -> float:
+        """Return the root of the sum that steps make smaller."""
+        return math.hypot(self._rms(targets), math.sqrt(self._pattern.roughness(self._values)))
 
     def _improve(self, targets: Sequence[TargetCurve], steps: int) -> str:
         """Make steps towards targets, and return why they ended."""
-        now, damping, slow = self._rms(targets), 0.0, 0
+        damping, slow = 0.0, 0
         for _ in range(steps):
-            if now <= ENOUGH:
+            if self._rms(targets) <= ENOUGH:
                 return "the shape is as wanted"
-            before, equations = self._values, self._equations(targets)
+            before, now, equations = self._values, self._left(targets), self._equations(targets)
             for _ in range(MOST_TRIALS):
-                try:
-                    values = self._step(*equations, damping)
-                    self._go(values)
-                    new = self._rms(targets)
-                except SimulationError:
-                    new = math.inf
+                new = self._left_with(self._pattern.solved(*equations, before, damping), targets)
                 if new < now:
                     break
                 damping = max(STRONGER * damping, WEAKEST)
             else:
-                self._go(before)
+                self._return_to(before)
                 return "no step leads nearer"
-            self._values, damping = values, damping / STRONGER if damping > WEAKEST else 0.0
-            self._tell(new)
+            damping = damping / STRONGER if damping > WEAKEST else 0.0
+            self._tell()
             slow = slow + 1 if new > (1.0 - STALLED) * now else 0
             if slow == 2:
                 return "steps lead hardly nearer"
-            now = new
         return f"{steps} steps were made"
 
-    def _tell(self, rms: float) -> None:
+    def _left_with(self, values: Array, targets: Sequence[TargetCurve]) -> float:
+        """Go to other values, and return what is left there, infinity if there is no equilibrium."""
+        try:
+            self._go(values)
+        except SimulationError:
+            return math.inf
+        self._values = values
+        return self._left(targets)
+
+    def _return_to(self, values: Array) -> None:
+        self._go(values)
+        self._values = values
+
+    def _take_palettes(self) -> str:
+        """Take values of palettes, from the linear problem about each pattern that was tried."""
+        free, best, least, tried = 100.0 * self._rms(self._targets), self._values, math.inf, set()
+        for _ in range(MOST_PALETTES):
+            values = self._pattern.printable(*self._equations(self._targets), self._values)
+            if values.tobytes() in tried:
+                break
+            tried.add(values.tobytes())
+            left = self._left_with(values, self._targets)
+            if not math.isfinite(left):
+                break
+            self._tell()
+            best, least = (values, left) if left < least else (best, least)
+        if not math.isfinite(least):
+            return "no pattern of the palette has an equilibrium near"
+        self._return_to(best)
+        return f"values of the palette; without it: rms distance {free:.3g} %"
+
+    def _tell(self) -> None:
         if self._progress is not None:
+            rms = self._rms(self._targets)
             self._progress(f"{self.equilibria} equilibria: rms distance {100 * rms:.3g} % of the rod")
 
     def result(self) -> DesignResult:
         """Search, and return what was found."""
         self._refuse_idle()
         if self._here[0].model.plane.exists:
-            before, rms = self._values, self._rms(self._targets)
-            values = self._step(*self._angles())
-            try:
-                self._go(values)
-                self._values = values
-            except SimulationError:
-                self._go(before)
-            if self._rms(self._targets) > rms:
-                self._go(before)
-                self._values = before
-            self._tell(self._rms(self._targets))
+            before, left = self._values, self._left(self._targets)
+            if not self._left_with(self._pattern.solved(*self._angles(), before, 0.0), self._targets) < left:
+                self._return_to(before)
+            self._tell()
         else:
             starts = [self._curve(here) for here in self._here]
             turns = max(_turning(target) for target in self._targets)
@@ -450,7 +339,7 @@ class _Search:
             for k in range(1, count):
                 near = [between(start, of, k / count) for start, of in zip(starts, self._targets, strict=True)]
                 self._improve(near, 2)
-        termination = self._improve(self._targets, MOST_STEPS)
+        termination = self._found()
         for _ in range(MOST_MODELS):
             scene = load_content(scene_content(self._scene), self._changes(self._values))
             simulator = Simulator(scene)
@@ -460,13 +349,20 @@ class _Search:
             self._here = self._built(self._values, self._here)
             self._parameters = [self._sought(here) for here in self._here]
             self._by_laws = self._are_laws()
-            termination = self._improve(self._targets, MOST_STEPS)
+            termination = self._found()
         return self._report(termination, simulator)
+
+    def _found(self) -> str:
+        """Go to the best pattern that is near, and return why the search ended there."""
+        ended = self._improve(self._targets, MOST_STEPS)
+        return self._take_palettes() if self._pattern.has_palette else ended
 
     def _refuse_idle(self) -> None:
         moved = np.max([np.abs(slopes).max(axis=(0, 1)) for slopes in self._slopes()], axis=0)
-        largest = moved * (self._high - self._low)
-        if idle := [name for name, of in zip(self._names, largest, strict=True) if of < 1e-12 * self._size]:
+        largest = moved * (self._pattern.high - self._pattern.low)
+        if idle := [
+            name for name, of in zip(self._names, largest[self._owner], strict=True) if of < 1e-12 * self._size
+        ]:
             raise InputError(f"vary {', '.join(idle[:4])}: acts on nothing at these stimuli; leave it out")
 
     def _report(self, termination: str, simulator: Simulator) -> DesignResult:
@@ -480,9 +376,9 @@ class _Search:
             length = float(np.linalg.norm(np.diff(made, axis=0), axis=1).sum())
             shapes.append(Shape(target, level, made, np.linalg.norm(away, axis=1), length, stable))
         final = equilibrium_of(simulator)
-        part = (self._values - self._low) / (self._high - self._low)
+        part = self._pattern.parts(self._values)[[not v.palette for v in self._varied for _ in v.start]]
         at_bounds = int(np.sum((part <= AT_BOUND) | (part >= 1.0 - AT_BOUND)))
-        values = self._split(self._values)
+        values = self._pattern.split(self._values)
         return DesignResult(
             scene, self._varied, values, shapes, at_bounds, self._sensitivity(final), self.equilibria, termination
         )
@@ -491,7 +387,7 @@ class _Search:
         """Return the displacements by errors of 1 % in each pattern, and in the thickness of each layer [m]."""
         found: dict[str, float] = {}
         slopes, begin = self._slopes()[-1], 0
-        for v, own in zip(self._varied, self._split(self._values), strict=True):
+        for v, own in zip(self._varied, self._pattern.split(self._values), strict=True):
             moved = slopes[..., begin : begin + len(own)] @ own
             found[v.path] = 0.01 * float(np.linalg.norm(moved, axis=1).max())
             begin += len(own)

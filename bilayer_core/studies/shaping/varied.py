@@ -17,8 +17,13 @@ from bilayer_core.studies.fitting.parameters import read_parameters
 
 Array = np.ndarray
 Vary = Sequence[str] | Mapping[str, Sequence[float | str]]
-"""``PATH=LO:HI`` or ``PATH=LO:HI:POINTS`` texts, or (lower, upper) or (lower, upper, points) by paths."""
-FORM = "must be PATH=LO:HI or PATH=LO:HI:POINTS, such as rods.strip.layers.active.eigenstrain.gain=-2%:2%:40"
+"""Texts ``PATH=LO:HI``, ``PATH=LO:HI:POINTS`` or ``PATH=V,V,…:PIECES``, or by paths what is between the colons."""
+FORM = (
+    "must be PATH=LO:HI, PATH=LO:HI:POINTS, PATH=V,V,… or PATH=V,V,…:PIECES, such as "
+    "rods.strip.layers.active.eigenstrain.gain=-2%:2%:40"
+)
+BETWEEN = 1e-3
+"""From the end of a piece to the start of the next, of their length."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +38,9 @@ class Varied:
     at : tuple of float
         Where the points are along the path of the rod [m]; empty for a number.
     start : ndarray
-        Values to begin with, shape (n_point,) or (1,).
+        Values to begin with, shape (n_point,), (n_piece,) or (1,).
+    palette : tuple of float
+        The only values that are allowed, of a number or of pieces, which have two points each; empty for any.
     """
 
     path: str
@@ -41,6 +48,7 @@ class Varied:
     high: float
     at: tuple[float, ...]
     start: Array
+    palette: tuple[float, ...] = ()
 
     @property
     def names(self) -> list[str]:
@@ -62,7 +70,22 @@ class Varied:
         """
         if not self.at:
             return {self.path: float(values[0])}
-        return {self.path: {"at": list(self.at), "value": values.tolist()}}
+        return {self.path: {"at": list(self.at), "value": self.in_scene(values).tolist()}}
+
+    def in_scene(self, values: Array) -> Array:
+        """Return the numbers of the scene for some values: a piece has one at either end.
+
+        Parameters
+        ----------
+        values : ndarray
+            As many as `start`.
+
+        Returns
+        -------
+        ndarray
+            As many as `names`.
+        """
+        return np.repeat(values, len(self.names) // len(self.start))
 
 
 def read_varied(scene: SceneConfig, asked: Vary) -> tuple[SceneConfig, list[Varied]]:
@@ -73,11 +96,11 @@ def read_varied(scene: SceneConfig, asked: Vary) -> tuple[SceneConfig, list[Vari
     InputError, SceneError
         If nothing is to vary, there is no such number, or the bounds or the number of points are none.
     """
-    triples = _triples(asked)
-    if not triples:
+    given = _given(asked)
+    if not given:
         raise InputError(f"vary: nothing is given; each {FORM}")
     found = []
-    for path, low, high, points in triples:
+    for path, ends, points in given:
         content = scene_content(scene)
         try:
             holder, place = read_overrides({path: 0.0})[0].find(content)
@@ -87,21 +110,39 @@ def read_varied(scene: SceneConfig, asked: Vary) -> tuple[SceneConfig, list[Vari
         if isinstance(held, dict) and held.keys() == {"at", "value"}:
             profile = held
             content = scene_content(load_content(content, {path: held["value"][0]}))
-        (bounds,) = read_parameters(load_content(content, ()), {path: (low, high)})
-        if points is None and profile is None:
+        low, high, palette = _bounds(load_content(content, ()), path, ends)
+        if points is None and (profile is None or palette):
             at: list[float] = []
-            start = np.array([held])
+            start = np.array([held if profile is None else profile["value"][0]])
         else:
-            at = profile["at"] if profile is not None and points is None else _places(scene, path, points)
+            at = profile["at"] if profile is not None and points is None else _places(scene, path, points, palette)
             start = np.full(len(at), held) if profile is None else np.interp(at, profile["at"], profile["value"])
-        start = np.clip(start.astype(float), bounds.low, bounds.high)
-        found.append(Varied(path, bounds.low, bounds.high, tuple(at), start))
+            start = start[::2] if palette else start
+        start = np.clip(start.astype(float), low, high)
+        found.append(Varied(path, low, high, tuple(at), start, palette))
         scene = load_content(scene_content(scene), found[-1].changes(start))
     return scene, found
 
 
-def _places(scene: SceneConfig, path: str, points: Any) -> list[float]:
-    """Return so many places along the layer or the rod that a path names."""
+def _bounds(scene: SceneConfig, path: str, ends: Sequence[Any]) -> tuple[float, float, tuple[float, ...]]:
+    """Return the bounds of a number and its palette, which is empty if `ends` are two bounds."""
+    if not isinstance(ends[0], list | tuple | np.ndarray):
+        (bounds,) = read_parameters(scene, {path: (ends[0], ends[1])})
+        return bounds.low, bounds.high, ()
+    content, values = scene_content(scene), []
+    for value in ends[0]:
+        changes = read_overrides([f"{path}={value}"])
+        holder, place = changes[0].find(scene_content(load_content(content, [f"{path}={value}"])))
+        values.append(holder[place])
+    palette = tuple(sorted(set(values)))
+    if len(palette) < 2:
+        raise InputError(f"vary {path}: a palette must have two values or more")
+    (bounds,) = read_parameters(scene, {path: (palette[0], palette[-1])})
+    return bounds.low, bounds.high, palette
+
+
+def _places(scene: SceneConfig, path: str, points: Any, palette: Sequence[float]) -> list[float]:
+    """Return so many places along the rod that a path names, or with a palette the ends of so many pieces."""
     try:
         count = int(str(points))
     except ValueError:
@@ -112,17 +153,27 @@ def _places(scene: SceneConfig, path: str, points: Any) -> list[float]:
     rods = {key: rod for k, rod in enumerate(scene.rods) for key in (rod.name, str(k))}
     if keys[0] != "rods" or keys[1] not in rods:
         raise InputError(f"vary {path}: points need a number of a rod, which may vary along it")
-    return np.linspace(0.0, rods[keys[1]].path.length, count).tolist()
+    length = rods[keys[1]].path.length
+    if not palette:
+        return np.linspace(0.0, length, count).tolist()
+    ends = np.repeat(np.linspace(0.0, length, count + 1), 2)[1:-1]
+    ends[1:-1] += np.tile([-0.5, 0.5], count - 1) * BETWEEN * length / count
+    return ends.tolist()
 
 
-def _triples(asked: Vary) -> list[tuple[str, Any, Any, Any]]:
+def _given(asked: Vary) -> list[tuple[str, Sequence[Any], Any]]:
+    """Return paths, bounds or a palette, and the number of points or None."""
     if isinstance(asked, Mapping):
-        given = [(str(path), list(bounds)) for path, bounds in asked.items()]
+        given: list[tuple[str, list[Any]]] = [(str(path), list(bounds)) for path, bounds in asked.items()]
     elif isinstance(asked, str) or not all(isinstance(text, str) for text in asked):
         raise InputError('vary: must be texts, ["PATH=LO:HI", ...], or bounds by path, {"PATH": (LO, HI)}')
     else:
-        given = [(path.strip(), bounds.split(":")) for path, _, bounds in (text.partition("=") for text in asked)]
+        texts = [(path.strip(), bounds.split(":")) for path, _, bounds in (text.partition("=") for text in asked)]
+        given = [(path, [b.split(",") if "," in b else b for b in bounds]) for path, bounds in texts]
+    found: list[tuple[str, Sequence[Any], Any]] = []
     for path, bounds in given:
-        if len(bounds) not in (2, 3):
+        count = 1 if bounds and isinstance(bounds[0], list | tuple | np.ndarray) else 2
+        if len(bounds) not in (count, count + 1):
             raise InputError(f"vary {shortened(path)}: {FORM}")
-    return [(path, bounds[0], bounds[1], bounds[2] if len(bounds) == 3 else None) for path, bounds in given]
+        found.append((path, bounds[:count], bounds[count] if len(bounds) > count else None))
+    return found

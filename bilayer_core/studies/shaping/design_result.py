@@ -1,0 +1,128 @@
+"""Results of a design: the scene with its pattern, each wanted shape and the one that was made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bilayer_core.errors import InputError
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.studies.shaping.target_curve import TargetCurve
+from bilayer_core.studies.shaping.varied import Varied
+
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A wanted shape and what became of it.
+
+    Attributes
+    ----------
+    target : TargetCurve
+        Moved to where the rod begins.
+    stimulus : dict of str to float
+        At which it is wanted.
+    made : ndarray
+        The rod's curve [m], shape (n, 3).
+    distances : ndarray
+        From the target [m], shape (n,).
+    length : float
+        Of the rod there [m].
+    stable : bool
+    """
+
+    target: TargetCurve
+    stimulus: dict[str, float]
+    made: Array
+    distances: Array
+    length: float
+    stable: bool
+
+
+@dataclass(frozen=True)
+class DesignResult:
+    """Pattern that a search found, and how near it comes.
+
+    Attributes
+    ----------
+    scene : SceneConfig
+        With the pattern.
+    varied : list of Varied
+    values : list of ndarray
+        Of each of them.
+    shapes : list of Shape
+    at_bounds : int
+        How many values are at their bounds.
+    sensitivity : dict of str to float
+        By layer, the largest displacement by an error of 1 % in its pattern or thickness [m].
+    equilibria : int
+        That were computed.
+    termination : str
+    """
+
+    scene: SceneConfig
+    varied: list[Varied]
+    values: list[Array]
+    shapes: list[Shape]
+    at_bounds: int
+    sensitivity: dict[str, float]
+    equilibria: int
+    termination: str
+
+    @property
+    def size(self) -> float:
+        """Length of the rod at the start [m]."""
+        return self._rod.path.length
+
+    @property
+    def _rod(self) -> Any:
+        return next(rod for rod in self.scene.rods if rod.name == rod_of(self.scene, self.varied))
+
+    @property
+    def largest(self) -> float:
+        """Largest distance, of the length of the rod."""
+        return max(float(shape.distances.max()) for shape in self.shapes) / self.size
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the distances, of the length of the rod."""
+        return math.sqrt(np.mean([np.mean(shape.distances**2) for shape in self.shapes])) / self.size
+
+    def __str__(self) -> str:
+        lines = [
+            f"{self.scene.name}: {sum(map(len, self.values))} values, {self.equilibria} equilibria; {self.termination}",
+            f"  distance from the target: at most {100 * self.largest:.3g} %, rms {100 * self.rms:.3g} % of the rod",
+        ]
+        for shape in self.shapes:
+            at = ", ".join(f"{name} = {value:g}" for name, value in shape.stimulus.items()) or "no stimulus"
+            lines.append(
+                f"  at {at}: {shape.target.source} is {1e3 * shape.target.length:.4g} mm long, the rod "
+                f"{1e3 * shape.length:.4g} mm; {'stable' if shape.stable else 'UNSTABLE'}"
+            )
+        if self.at_bounds:
+            lines.append(f"  {self.at_bounds} values are at their bounds, which limit the shape")
+        for layer, moved in self.sensitivity.items():
+            lines.append(f"  an error of 1 % in {layer} moves the rod by up to {100 * moved / self.size:.3g} %")
+        return "\n".join(lines)
+
+
+def rod_of(scene: SceneConfig, varied: Sequence[Varied]) -> str:
+    """Return the name of the rod that is shaped: the only one, or that of the first path.
+
+    Raises
+    ------
+    InputError
+        If it is not told which.
+    """
+    names = [name for rod in scene.rods for name in rod.copy_names]
+    if len(names) == 1:
+        return names[0]
+    keys = varied[0].path.split(".")
+    if keys[0] == "rods" and keys[1] in names:
+        return keys[1]
+    raise InputError(f"vary {varied[0].path}: names no single rod, of which there are {', '.join(names)}")
