@@ -63,10 +63,6 @@ class Spans(Part):
         """Return the value at time `t` [s], in the unit of the channel."""
         return self.span(t).value(t)
 
-    def breakpoint_after(self, t: float) -> float:
-        """Return the first corner or jump after `t` [s], infinity if there is none."""
-        return self.span(t).until
-
     def value_before(self, t: float, h: float) -> float:
         """Return the value at the end `t` [s] of a step of length `h` [s]: the limit from within the step where it
         jumps at `t`.

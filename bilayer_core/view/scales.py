@@ -115,15 +115,6 @@ def visible_points(
     return np.concatenate(points)
 
 
-def seen_from(eye: np.ndarray, target: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return the slopes of the lines of sight to `points`: to the right and upwards of the target, shape
-    (points, 2).
-    """
-    axes = _picture_axes((eye - target) / np.linalg.norm(eye - target))
-    relative = (points - eye) @ axes.T
-    return relative[:, :2] / -relative[:, 2:]
-
-
 def _picture_axes(back: np.ndarray) -> np.ndarray:
     """Return the unit vectors to the right, upwards and towards the eye, as rows; z is up in the picture."""
     right = np.cross([0.0, 0.0, 1.0], back)

@@ -37,7 +37,7 @@ def test_steps_end_on_every_breakpoint_and_are_short_after_a_jump():
         reports.append(simulator.step(until=0.2))
         times.append(simulator.time)
     schedule, points, t = simulator.scene.stimuli["heat"].schedule, [], 0.0
-    while (t := schedule.breakpoint_after(t + 1e-9)) < 0.2:
+    while (t := schedule.span(t + 1e-9).until) < 0.2:
         points.append(t)
     assert len(points) == 6 and set(points) <= set(times) and times[-1] == 0.2
     after = [reports[times.index(point)].length for point in points]

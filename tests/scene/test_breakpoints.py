@@ -38,7 +38,7 @@ def schedule(**content):
 def breakpoints(of, end=END):
     """All of them from 0 to `end`."""
     found, t = [], -1e-3
-    while (t := of.breakpoint_after(t)) < end:
+    while (t := of.span(t).until) < end:
         found.append(t)
     return found
 
@@ -85,18 +85,18 @@ def test_breakpoints_of_a_wave_do_not_drift_or_repeat_after_many_periods():
     wave = schedule(**{**SQUARE, "period": 0.1, "duty": 0.5, "start": 0.0})
     t, count = 0.0, 0
     while t < 1000.0 - 1e-9:
-        t, count = wave.breakpoint_after(t), count + 1
+        t, count = wave.span(t).until, count + 1
     assert count == 20000 and t == pytest.approx(1000.0, abs=1e-12)
 
 
 def test_a_sine_is_seen_four_times_a_period_from_its_start_on():
     sine = schedule(type="sine", mean=0.5, amplitude=0.4, period=0.02, start=1.0)
-    assert sine.breakpoint_after(0.0) == 1.0
+    assert sine.span(0.0).until == 1.0
     found = [t for t in breakpoints(sine, 1.0601)]
     assert found == pytest.approx([1.0 + 0.005 * k for k in range(13)], abs=1e-12)
 
 
 def test_loads_have_those_of_what_drives_them():
     load = {"name": "pull", "rod": "arm", "position": 0.0, "force": [0, 0, 1]}
-    assert Load(**load).factor.breakpoint_after(0.0) == math.inf
-    assert Load(**load, schedule=RAMP).factor.breakpoint_after(0.3) == 1.1
+    assert Load(**load).factor.span(0.0).until == math.inf
+    assert Load(**load, schedule=RAMP).factor.span(0.3).until == 1.1

@@ -20,7 +20,7 @@ from bilayer_core.view.camera import HALF_SLOPE, Insets, Shot
 from bilayer_core.view.colouring import choose_colouring, contact_pressure
 from bilayer_core.view.overlay import round_length
 from bilayer_core.view.render import Look, Studio
-from bilayer_core.view.scales import ARROW_SHARE, choose_scales, seen_from
+from bilayer_core.view.scales import ARROW_SHARE, choose_scales
 from bilayer_core.view.theme import BACKGROUND
 from bilayer_core.view.window import pixels_of
 
@@ -59,8 +59,9 @@ BARS = slice(int(0.85 * SIZE[1]), SIZE[1])
 
 
 def test_what_is_looked_at_is_in_the_middle_and_slopes_are_those_of_perspective():
-    eye, target = np.array([0.0, -2.0, 0.0]), np.zeros(3)
-    slopes = seen_from(eye, target, np.array([[0, 0, 0], [1, 0, 0], [0, 0, 1], [1, 2, 0]], float))
+    shot = Shot(np.array([0.0, -2.0, 0.0]), np.zeros(3), np.array([0.0, 0.0, 1.0]), None, 1.0)
+    pixels = pixels_of(shot, np.array([[0, 0, 0], [1, 0, 0], [0, 0, 1], [1, 2, 0]], float), SIZE)
+    slopes = (pixels / SIZE[1] - [0.5 * SIZE[0] / SIZE[1], 0.5]) * [2.0 * HALF_SLOPE, -2.0 * HALF_SLOPE]
     assert slopes == pytest.approx(np.array([[0, 0], [0.5, 0], [0, 0.5], [0.25, 0]]), abs=1e-12)
 
 
