@@ -17,12 +17,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bilayer_core.engine.newton import SETTLED_WITHIN
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.model.model import Model
 from bilayer_core.model.state import PARTS, State
 from bilayer_core.observed.frame import Description
 from bilayer_core.simulation.gains import put_gains
 from bilayer_core.simulation.gradients.course import Course
+from bilayer_core.simulation.gradients.followed import FOLLOWING
 from bilayer_core.simulation.gradients.nearby import (
     PLACES,
     Builders,
@@ -55,6 +57,7 @@ DIFFERENTIATED = {
     "barrier",
     "rod barrier",
     "gyroscopic",
+    *FOLLOWING,
 }
 """Forces through which runs are differentiated."""
 SEEDS = ("positions", "velocities")
@@ -163,6 +166,8 @@ class RunResponse:
             reasons.append("free bodies")
         if len(model.joins.first):
             reasons.append("closed rods")
+        if "added mass" in model.forces and self._stepper.engine.problem.raised.exists:
+            reasons.append("added mass of layers that are unlike")
         if any(
             len(method.couplings) > len(method.nodes) or method.couplings.shape[0] > method.couplings.shape[1]
             for method in self._stepper.engine.methods
@@ -182,7 +187,15 @@ class RunResponse:
 
     def _again(self, model: Model, surroundings: Surroundings | None = None) -> StepAgain:
         around = surroundings or Surroundings(model, self._stepper.ahead)
-        return StepAgain(model, around, self._stepper.same_time, self._stages, self._history)
+        stepper = self._stepper
+        return StepAgain(
+            model,
+            around,
+            stepper.same_time,
+            self._stages,
+            self._history,
+            SETTLED_WITHIN * stepper.steps.newton_tolerance,
+        )
 
     def _begins_at_start(self) -> bool:
         """Return whether the run began at the start of its scene, which depends on the scene's numbers."""
@@ -278,7 +291,7 @@ class RunResponse:
             [],
             np.zeros(here.end_rates.size),
             np.zeros(here.transduction.size),
-            np.zeros(here.end_rates.size),
+            np.zeros(here.end_rates.size + here.wet),
         )
         if number.laws.size:
             found.gain[number.laws] = 1.0
@@ -318,11 +331,12 @@ class RunResponse:
             again.finish(n)
         carry = step.method.carry
         push = (again.end_rates - again.origin_rates) / again.stage.momentum_length
+        of_fluid = again.gained_momentum / (again.stage.momentum_length * (1.0 - carry))
         if self._history:
             push = (push - carry * step.start.strain_acceleration) / (1.0 - carry)
             if not step.method.history:
                 push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
-        return [*gradients, again.transduction.copy(), again.end_rates.copy(), push]
+        return [*gradients, again.transduction.copy(), again.end_rates.copy(), np.concatenate([push, of_fluid])]
 
     def _fitted(self, again: StepAgain, state: State, rates: tuple[Array, Array] | None) -> State:
         """Return a state that a model with another number takes: with what only such models have, prescribed bodies

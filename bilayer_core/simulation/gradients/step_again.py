@@ -6,27 +6,42 @@ its stages follow from these; Newton's method then makes corrections that the ro
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from bilayer_core.engine.evaluator import Evaluator
+from bilayer_core.engine.linear.newton_matrix import solve
 from bilayer_core.engine.step_ends import end_stage
-from bilayer_core.engine.steps_again import begin_stage, begin_step
+from bilayer_core.engine.steps_again import (
+    Differences,
+    Lack,
+    begin_stage,
+    begin_step,
+    differentiate_by_laws,
+    follow,
+    solve_with_lack,
+)
 from bilayer_core.errors import SimulationError
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Method
 from bilayer_core.model.state import State
 from bilayer_core.simulation.edge_space import turn_between
+from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.surroundings import Surroundings
 
 Array = np.ndarray
+Lacking = tuple[Entries | None, Entries | None]
+"""What a Hessian lacks, and the gradient by the origin of a stage; None for nothing."""
+ROUNDS, ROUNDED = 80, 1e-13
+"""Of solutions with what a Hessian lacks: the most there may be, and what may be left, of the whole."""
 MOST = 12
 """Corrections of a stage."""
 ENOUGH = 1e-13
-"""Of the longest rod: a last correction."""
+"""Of the longest rod: a last correction. With friction the tolerance of the run is enough."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +94,8 @@ class StepAgain(Evaluator):
         Of a step, at most.
     history : bool
         Whether the integrator keeps stage derivatives.
+    tolerance : float
+        Of Newton's method [m/s].
 
     Attributes
     ----------
@@ -86,19 +103,26 @@ class StepAgain(Evaluator):
         The start of the step, then the end of each stage.
     guesses : list of Configuration
         Where Newton's method began in each stage.
+    size, wet : int
+        Of unknowns, and of the fluid's momentum in their places.
     """
 
-    def __init__(self, model: Model, surroundings: Surroundings, same: float, stages: int, history: bool):
+    def __init__(
+        self, model: Model, surroundings: Surroundings, same: float, stages: int, history: bool, tolerance: float
+    ):
         super().__init__(model, stages, history)
         self.surroundings, self._same = surroundings, same
         self.places: list[Configuration] = [self.new() for _ in range(stages + 1)]
         self.guesses: list[Configuration] = [self.new() for _ in range(stages)]
-        self._spare = self.new()
+        self.spare = self.new()
         self._size = max(rod.path.length for rod in model.scene.rods)
+        self._tolerance = tolerance
+        self._settles = not {"friction", "rod friction"}.isdisjoint(model.forces)
         layout = self.problem.strands
         self.of_nodes = layout.node_unknown[:, None] + np.arange(3)
         self.of_edges = layout.edge_unknown
         self.size = len(self.sums.gradient)
+        self.wet = self.size if self.problem.fluid.exists else 0
 
     def begin(self, step: KeptStep) -> None:
         """Take the start of a step, with what acts during it."""
@@ -130,6 +154,14 @@ class StepAgain(Evaluator):
         return self._work.end.strain_rate
 
     @property
+    def gained_momentum(self) -> Array:
+        """What the fluid's momentum has gained over the stage, shape (wet,)."""
+        gained = np.zeros(self.wet)
+        if self.wet:
+            gained[self.of_nodes] = self._work.end.fluid_momentum - self._work.origin.fluid_momentum
+        return gained
+
+    @property
     def origin_rates(self) -> Array:
         """Rates of strains at its origin, likewise."""
         return self._work.origin.strain_rate
@@ -153,7 +185,15 @@ class StepAgain(Evaluator):
 
     def _travel(self, base: Configuration, travel: Array, n: int) -> None:
         self.move(base, travel, self._no_bodies, self.places[n + 1])
-        self.update_lagged(self.places[n + 1])
+        self.follow(self.places[n + 1])
+
+    def follow(self, at: Configuration) -> None:
+        """Let forces take from a configuration what they hold fixed."""
+        if self._settles:
+            self.select(at, None)
+            follow(self.problem, at, self.stage)
+        else:
+            self.update_lagged(at)
 
     @property
     def _no_bodies(self) -> Array:
@@ -171,34 +211,74 @@ class StepAgain(Evaluator):
         self.evaluate(self.places[n + 1])
         return self.sums.gradient.copy()
 
-    def find(self, n: int) -> tuple[Reached, float]:
-        """Go to where stage n ended, and factorise the Hessian there; return where, and the last correction [m]."""
-        at, spare, moved = self.places[n + 1], self._spare, math.inf
+    def find(self, n: int, matrices: Callable[[StepAgain, int], Lacking]) -> tuple[Reached, float, Lacking]:
+        """Go to where stage n ended, and factorise the Hessian there; return where, the last correction [m], and what
+        the Hessian lacks there, as `matrices` has it.
+        """
         self.go(n, self._expected(n))
-        for _ in range(MOST):
+        lacking: Lacking = (None, None)
+        for k in range(MOST):
+            at = self.places[n + 1]
             self.evaluate(at, second=True)
+            gradient = self.sums.gradient.copy()
             shift, simplified = self.factorise(at)
             if shift or simplified:
                 raise SimulationError("gradient: a step ends where the shape is unstable", self._step.begin)
-            travel = self.newton_step(self.sums.gradient, self._no_bodies)[0]
+            if k and self._settles:
+                lacking = matrices(self, n)
+            travel = -self.solved(gradient[:, None], lacking[0])[:, 0]
             moved = np.abs(travel[self.of_nodes]).max()
             moved = max(moved, self._size * np.abs(travel[self.of_edges]).max(initial=0.0))
-            if not moved > ENOUGH * self._size:
+            if not moved > max(ENOUGH * self._size, self._settles * self._tolerance * self.stage.length):
                 break
-            self.move(at, travel, self._no_bodies, spare)
-            at, spare = spare, at
-            self.update_lagged(at)
-        self.places[n + 1], self._spare = at, spare
+            self.move(at, travel, self._no_bodies, self.spare)
+            self.places[n + 1], self.spare = self.spare, at
+            self.follow(self.places[n + 1])
+        if lacking[0] is None:
+            lacking = matrices(self, n)
+        at = self.places[n + 1]
         turn = at.total_angle - self.guesses[n].total_angle
-        return Reached(at.position.copy(), turn), float(moved)
+        return Reached(at.position.copy(), turn), float(moved), lacking
+
+    def solved(self, right: Array, lacking: Entries | None) -> Array:
+        """Return the inverse of the factorised Hessian and what it lacks together, times columns."""
+        problem, sums, found = self.problem, self.sums, np.empty(right.shape)
+        if lacking is not None:
+            lack = Lack(row=lacking.row, column=lacking.column, value=lacking.value, **self._krylov)
+        for k in range(right.shape[1]):
+            sums.gradient[:], sums.body[:] = right[:, k], 0.0
+            if lacking is None:
+                solve(problem)
+                found[:, k] = -problem.system.step
+            else:
+                solve_with_lack(problem, lack, ROUNDED)
+                found[:, k] = problem.system.step
+        return found
+
+    @cached_property
+    def _krylov(self) -> dict[str, Array]:
+        """Scratch of `Lack`."""
+        return {
+            "basis": np.zeros((ROUNDS + 1, self.size)),
+            "projected": np.zeros((ROUNDS, ROUNDS + 1)),
+            "turns": np.zeros((ROUNDS, 2)),
+            "rest": np.zeros(ROUNDS + 1),
+        }
+
+    def differentiate_by_laws(self, at: Configuration, differences: Differences, change: float) -> None:
+        """Write how the gradient at a configuration depends on the eigenstrain of each law; see `Differences`."""
+        self.select(at, None)
+        differentiate_by_laws(self.problem, self._work, differences, at, change)
 
     def _expected(self, n: int) -> Reached:
         """Return where stage n ended, as far as both ends of the step tell."""
         step, state, work, guess = self._step, self._step.start, self._work, self.guesses[n]
         edges, h, end = len(self.of_edges), step.length, n + 1 == len(step.method.couplings)
         base = guess if end else self.places[0]
-        there = tangents_of(self.problem.strands.edge_node, step.end.position)
-        turn = turn_between(base.tangent[:edges], base.director1[:edges], there, step.end.director1)
+        turn = np.zeros(edges)
+        if self.problem.space.exists:
+            there = tangents_of(self.problem.strands.edge_node, step.end.position)
+            turn = turn_between(base.tangent[:edges], base.director1[:edges], there, step.end.director1)
         if end:
             return Reached(step.end.position, turn)
         moved = step.end.position - state.position - self.stage.length * step.end.velocity
