@@ -1,5 +1,7 @@
 """Derivatives of runs against differences of runs with the same steps."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -43,6 +45,7 @@ EULER = {"solver.integrator": "implicit_euler", "solver.dt": 0.004, "solver.tole
 ALPHA = {"solver.integrator": "generalised_alpha"}
 UNLIKE = {"solver.integrator": "tr_bdf2", THICKNESS: 1.5e-4}
 VISCOUS, SPACE = {VISCOSITY: 0.05}, {"solver.dimension": 3}
+HEAVY = {"fluid.added_mass": True}
 IN_WATER = SPACE | {"fluid": WATER}
 CASES = {
     "in a plane": ("bending", HANGING, 0.2, [GAIN, LEVEL, TIME, MODULUS, THICKNESS, "gravity.2", LENGTH]),
@@ -137,6 +140,7 @@ BACK = {
     "generalised alpha": ("bending", HANGING | ALPHA | VISCOUS, 0.1, [GAIN, MODULUS]),
     "contact": ("bending", ON_A_POST, 0.2, [LEVEL, "obstacles.post.radius"]),
     "friction": ("jumping", {}, 0.03, ["gravity.2"]),
+    "added mass": ("flagellum", {}, 0.05, ["fluid.density"]),
     "drag of turns": ("bending", IN_WATER | {"loads": [JET]}, 0.1, ["fluid.density"]),
 }
 
@@ -191,6 +195,36 @@ def test_steps_of_which_no_state_is_kept_are_made_again_bit_for_bit():
             assert one.method is other.method
 
 
+def test_gradients_do_not_depend_on_the_room_for_states():
+    found = [kept_run("bending", HANGING, 0.1)[1].gradient("com", GAIN)["com", GAIN]]
+    simulator = Simulator(load_scene("bending", TIGHT | HANGING))
+    result = simulator.run(0.1, gradients=5 * simulator._state.values.nbytes)
+    assert len(result.differentiable._course._spans) <= 5
+    assert np.array_equal(result.gradient("com", GAIN)["com", GAIN], found[0])
+
+
+@pytest.mark.parametrize("room", [0, -1, 1e6, "much"])
+def test_no_room_for_states_is_refused(room):
+    with pytest.raises(InputError, match="gradients: found .*; allowed are True, False and a number of bytes above 0"):
+        Simulator("bending").run(1e-2, gradients=room)
+
+
+def test_a_motion_that_forgets_its_start_is_told():
+    simulator, result = kept_run("bending", HANGING, 0.05)
+    seeds = {"positions": np.ones((simulator.model.node_count, 3))}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        result.pull_back(seeds, GAIN)
+        result.gradient("com", GAIN)
+    response = result.differentiable.response()
+    numbers = response.numbers([GAIN])[GAIN]
+    response._size = 1e-20
+    with pytest.warns(RuntimeWarning, match="forgets its start: at .* s derivatives have grown"):
+        response.forward(numbers)
+    with pytest.warns(RuntimeWarning, match="forgets its start: at .* s derivatives have grown"):
+        response.backward(seeds, numbers)
+
+
 def test_a_run_that_begins_elsewhere_begins_there_whatever_the_numbers_are():
     simulator = Simulator(load_scene("bending", HANGING))
     simulator.run(0.05)
@@ -203,7 +237,7 @@ def test_a_run_that_begins_elsewhere_begins_there_whatever_the_numbers_are():
 @pytest.mark.parametrize(
     ("name", "overrides", "to", "told"),
     [
-        ("flagellum", {}, "fluid.density", "the force 'added mass'"),
+        ("ring", {}, "gravity.2", "closed rods"),
         ("arch", {}, "gravity.2", "free bodies"),
         ("bending", {"solver.integrator": "implicit_midpoint"}, GAIN, "end beyond their last stage"),
         ("bending", {"start": "settle"}, GAIN, "a start that settles"),

@@ -12,6 +12,7 @@ directors, which count then, are those that the directors of the steps have.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -64,6 +65,8 @@ SEEDS = ("positions", "velocities")
 """By which a derivative comes back from the end of a run."""
 AT_END = ("strain_rate", "reached", "strain_push")
 """Rates that a number changes by itself at the end of a step."""
+FORGETS = 1e6
+"""Lengths of the rod by which a derivative by a number, times its size, moves it."""
 NEAR = 1e-5
 """h of a number, over its size, where barriers are steep."""
 
@@ -378,7 +381,8 @@ class RunResponse:
         along = Rates.zeros(self._here, count)
         for k, number in enumerate(numbers):
             along.place[:, k], along.speed[:, k], along.strain_rate[:, k], along.reached[:, k] = self._start(number)
-        self._left = 0.0
+        self._left, self._forgets = 0.0, False
+        per = np.array([self._size / number.scale for number in numbers])
         for step in self._course.steps(self._maker):
             reached = rates.take(step)
             self._note(step, reached)
@@ -398,17 +402,25 @@ class RunResponse:
             along = rates.forward(along, acts, gradients)
             for part in AT_END:
                 getattr(along, part)[:] += np.stack([getattr(of, part) for of in direct], axis=-1)
-            self._look_at(along, step)
+            self._look_at(along, step, per, FORGETS)
         return along
 
     def _note(self, step: KeptStep, reached: Sequence[Reached]) -> None:
         self._left = max(self._left, float(np.abs(reached[-1].position - step.end.position).max()))
 
-    def _look_at(self, along: Rates, step: KeptStep) -> None:
-        """Refuse to go on where a motion has forgotten its start."""
-        largest = np.abs(along.place[self._here.of_nodes]).max(initial=0.0)
-        if not math.isfinite(largest):
+    def _look_at(self, rates: Rates, step: KeptStep, per: Array | float, most: float) -> None:
+        """Tell once where a motion has forgotten its start: where rates are `most` times `per` or more."""
+        grown = float((np.abs(rates.place[self._here.of_nodes]) / per).max(initial=0.0))
+        if not math.isfinite(grown):
             raise SimulationError("gradient: derivatives grow beyond all numbers", step.begin)
+        if grown > most and not self._forgets:
+            self._forgets = True
+            warnings.warn(
+                f"gradient: the motion forgets its start: at {step.begin:.6g} s derivatives have grown {grown:.2g} "
+                f"times, beyond {most:.2g}, where they tell nothing any more; differentiate a shorter run",
+                RuntimeWarning,
+                stacklevel=5,
+            )
 
     def backward(self, seeds: Mapping[str, Array], numbers: Sequence[Number]) -> list[float]:
         """Return the derivative by each number of Σ seed · quantity at the end of the run."""
@@ -425,11 +437,14 @@ class RunResponse:
             (back.place if name == SEEDS[0] else back.speed)[here.of_nodes, 0] = given
         back.place, back.speed = free @ back.place, free @ back.speed
         begun = self._rates_at_starts([number for number in numbers if number.rates is not None])
-        found = np.zeros(len(numbers))
+        found, self._forgets = np.zeros(len(numbers)), False
+        given, tolerance = np.abs(back.place).max(), self._stepper.steps.newton_tolerance
         for step in self._course.steps(self._maker, backward=True):
             reached = rates.take(step)
             end = back
             back, acts, direct = rates.backward(end)
+            if given > 0.0:  # what Newton's method leaves then moves the end by more than the rod's length
+                self._look_at(back, step, given, self._size / (tolerance * step.length))
             for number, rates_at_starts in begun:
                 number.rates = rates_at_starts.pop()
             for k, number in enumerate(numbers):
