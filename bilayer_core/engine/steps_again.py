@@ -27,6 +27,9 @@ from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Method, Stage, StageInputs, StateArrays, Work
 
+DIRECTOR = 1024.0
+"""Change of a director over that of a position [1/m]."""
+
 
 @record
 class Differences:
@@ -36,8 +39,11 @@ class Differences:
     ways: Matrix  # in which nodes move, shape (n_way, 3)
     node_colour: Indices
     edge_colour: Indices
-    by_place: Matrix  # for each colour a row for each way of nodes, then a row for each colour of edges
+    by_place: (
+        Matrix  # for each colour a row for each way of nodes, a row for each colour of edges, then those of bodies
+    )
     by_origin: Matrix
+    by_director: Matrix  # of raised edges at the origin: for each colour of edges a row for each component
     by_law: Matrix  # shape (n_law, size)
     pressing: Flags  # forces that are evaluated before others take anything from a configuration, shape (n_force,)
     following: Flags  # these others
@@ -111,8 +117,12 @@ def _add_gradient(p, at, stage, factor, out, row):
         find_rod_contacts(p, at)
     add_forces(p, at, stage, False, False)
     expand_to_unknowns(p, at)
-    for j in range(out.shape[1]):
+    rods = p.sums.gradient.shape[0]
+    for j in range(rods):
         out[row, j] += factor * p.sums.gradient[j]
+    for f in range(p.sums.body.shape[0]):
+        for c in range(6):
+            out[row, rods + 6 * f + c] += factor * p.sums.body[f, c]
 
 
 @kernel
@@ -126,8 +136,13 @@ def _write_step(p, differences, row, h):
     """Write a step of all unknowns of a row of differences."""
     step, strands, ways = p.system.step, p.strands, differences.ways
     step[:] = 0.0
+    p.system.body_step[:] = 0.0
     count = ways.shape[0]
-    of_nodes = count * differences.colours
+    of_nodes, bodies = count * differences.colours, 6 * p.bodies.mass.shape[0]
+    motion = row - (differences.by_place.shape[0] - bodies)
+    if motion >= 0:
+        p.system.body_step[motion // 6, motion % 6] = h
+        return
     if row < of_nodes:
         for i in range(differences.node_colour.shape[0]):
             if differences.node_colour[i] == row // count:
@@ -147,7 +162,6 @@ def differentiate_followed(p, differences, at, trial, stage, h):
     by_place, by_origin, selected = differences.by_place, differences.by_origin, p.sums.selected
     by_place[:] = 0.0
     by_origin[:] = 0.0
-    p.system.body_step[:] = 0.0
     for row in range(by_place.shape[0]):
         for side in range(-1, 2, 2):
             _write_step(p, differences, row, side * h)
@@ -166,8 +180,22 @@ def differentiate_followed(p, differences, at, trial, stage, h):
             _take(p, at, stage)
             _add_gradient(p, at, stage, side / (2.0 * h), by_origin, row)
             _move_origin(p, stage, -1.0)
+    for row in range(differences.by_director.shape[0]):
+        for side in range(-1, 2, 2):
+            _move_directors(p, differences, row, side * h * DIRECTOR, stage)
+            _add_gradient(p, at, stage, side / (2.0 * h * DIRECTOR), differences.by_director, row)
+            _move_directors(p, differences, row, -side * h * DIRECTOR, stage)
     _take(p, at, stage)
     return READY
+
+
+@kernel
+def _move_directors(p, differences, row, h, stage):
+    """Move a component of those of a colour at the origin of a stage."""
+    raised = p.raised
+    for r in range(raised.edge.shape[0]):
+        if differences.edge_colour[raised.edge[r]] == row // 3:
+            stage.origin_strain[raised.first + 3 * raised.slot[r] + row % 3] += h
 
 
 @piece(int, Problem, Differences, Configuration, Configuration, Stage, float)
@@ -177,7 +205,6 @@ def differentiate_momentum(p, differences, at, trial, stage, h):
     """
     rows = differences.by_place
     rows[:] = 0.0
-    p.system.body_step[:] = 0.0
     for row in range(rows.shape[0]):
         for side in range(-1, 2, 2):
             _write_step(p, differences, row, side * h)
@@ -209,11 +236,14 @@ def differentiate_by_laws(p, work, differences, at, change):
 
 @kernel
 def _solve(p, out):
-    """Write the inverse of the factorised Hessian times the present gradient."""
-    p.sums.body[:] = 0.0
+    """Write the inverse of the factorised Hessian times the present gradient, of free bodies last."""
     solve(p)
-    for j in range(out.shape[0]):
+    rods = p.system.step.shape[0]
+    for j in range(rods):
         out[j] = -p.system.step[j]
+    for f in range(p.bodies.mass.shape[0]):
+        for c in range(6):
+            out[rods + 6 * f + c] = -p.system.body_step[f, c]
 
 
 @kernel
@@ -230,10 +260,11 @@ def solve_with_lack(p, lack, enough):
     `System.step`, by GMRES with the Hessian before it; what is left over is `enough` of the whole at most.
     """
     basis, projected, turns, rest = lack.basis, lack.projected, lack.turns, lack.rest
-    gradient, step, size = p.sums.gradient, p.system.step, basis.shape[1]
+    step, body_step, size, rods = p.system.step, p.system.body_step, basis.shape[1], p.sums.gradient.shape[0]
     _solve(p, basis[0])
     whole, count = math.sqrt(_dot(basis[0], basis[0])), 0
     step[:] = 0.0
+    body_step[:] = 0.0
     if whole == 0.0:
         return READY
     rest[:] = 0.0
@@ -242,9 +273,14 @@ def solve_with_lack(p, lack, enough):
         basis[0, j] /= whole
     while count < projected.shape[0] and abs(rest[count]) > enough * whole:
         now, after = basis[count], basis[count + 1]
-        gradient[:] = 0.0
+        p.sums.gradient[:] = 0.0
+        p.sums.body[:] = 0.0
         for m in range(lack.row.shape[0]):
-            gradient[lack.row[m]] += lack.value[m] * now[lack.column[m]]
+            j, force = lack.row[m], lack.value[m] * now[lack.column[m]]
+            if j < rods:
+                p.sums.gradient[j] += force
+            else:
+                p.sums.body[(j - rods) // 6, (j - rods) % 6] += force
         _solve(p, after)
         for j in range(size):
             after[j] += now[j]
@@ -267,12 +303,15 @@ def solve_with_lack(p, lack, enough):
         rest[count] *= turns[count, 0]
         count += 1
     step[:] = 0.0
+    body_step[:] = 0.0
     for k in range(count - 1, -1, -1):
         for m in range(k + 1, count):
             rest[k] -= projected[m, k] * rest[m]
         rest[k] /= projected[k, k]
-        for j in range(size):
+        for j in range(rods):
             step[j] += rest[k] * basis[k, j]
+        for j in range(rods, size):
+            body_step[(j - rods) // 6, (j - rods) % 6] += rest[k] * basis[k, j]
     return READY
 
 

@@ -46,6 +46,8 @@ ALPHA = {"solver.integrator": "generalised_alpha"}
 UNLIKE = {"solver.integrator": "tr_bdf2", THICKNESS: 1.5e-4}
 VISCOUS, SPACE = {VISCOSITY: 0.05}, {"solver.dimension": 3}
 HEAVY = {"fluid.added_mass": True}
+FREE = {"type": "free", "mass": "2 g", "inertia": ["0.3 g cm^2", "0.5 g cm^2", "0.7 g cm^2"]}
+TURNING = SPACE | {"bodies.wall.motion": FREE | {"angular_velocity": [3.0, 5.0, -4.0]}}
 IN_WATER = SPACE | {"fluid": WATER}
 CASES = {
     "in a plane": ("bending", HANGING, 0.2, [GAIN, LEVEL, TIME, MODULUS, THICKNESS, "gravity.2", LENGTH]),
@@ -140,6 +142,7 @@ BACK = {
     "generalised alpha": ("bending", HANGING | ALPHA | VISCOUS, 0.1, [GAIN, MODULUS]),
     "contact": ("bending", ON_A_POST, 0.2, [LEVEL, "obstacles.post.radius"]),
     "friction": ("jumping", {}, 0.03, ["gravity.2"]),
+    "a body that turns": ("bending", HANGING | TURNING, 0.05, [GAIN, "gravity.2"]),
     "added mass": ("flagellum", {}, 0.05, ["fluid.density"]),
     "drag of turns": ("bending", IN_WATER | {"loads": [JET]}, 0.1, ["fluid.density"]),
 }

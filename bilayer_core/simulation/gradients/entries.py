@@ -36,6 +36,14 @@ class Entries:
         """The transpose."""
         return Entries(self.column, self.row, self.value, self.shape[::-1])
 
+    def beside(self, columns: Array, numbers: Array) -> Entries:
+        """Return a matrix with some columns, shape (n, rows), beside its own."""
+        if not len(columns):
+            return self
+        which, row = np.nonzero(columns)
+        parts = (self.row, row), (self.column, numbers[which]), (self.value, columns[which, row])
+        return Entries(*(np.concatenate(of) for of in parts), self.shape)
+
     def masked(self, kept: Array) -> Entries:
         """Return a matrix without the rows and columns that are not kept: factors, shape (n,)."""
         return Entries(self.row, self.column, self.value * kept[self.row] * kept[self.column], self.shape)

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from bilayer_core.engine.steps_again import Differences, differentiate_followed, differentiate_momentum
+from bilayer_core.errors import InputError
 from bilayer_core.model.force_slots import NAMES
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration
@@ -46,6 +47,8 @@ class Followed:
         self._turns = again.problem.space.exists
         self._colours, self._edge_colours = np.arange(nodes) % COLOURS, self._first % COLOURS
         self._shortest = float(strands.rest_length.min())
+        held = again.problem.constrained.node[again.problem.constrained.free >= 0]
+        self._held = self._near(held, 0)
         strand = np.zeros(nodes, dtype=int)
         strand[1:] = np.cumsum(~np.isin(np.arange(nodes - 1), self._first))
         station = [(again.of_nodes[i], again.of_edges[self._first == i]) for i in range(nodes)]
@@ -57,6 +60,14 @@ class Followed:
                 entries += [(3 * colour + c, row, again.of_nodes[i, c]) for row in seen]
             for unknown in station[i][1] if self._turns else ():
                 entries += [(3 * COLOURS + colour, row, unknown) for row in seen]
+        raised, of_directors = again.problem.raised, [(0, 0, 0)][:0]
+        for edge, slot in zip(raised.edge, raised.slot, strict=True):
+            i = self._first[edge]
+            near = [j for j in range(max(i - REACH, 0), min(i + REACH + 2, nodes)) if strand[j] == strand[i]]
+            for row in np.concatenate([part for j in near for part in station[j]]):
+                of_directors += [(3 * (i % COLOURS) + c, row, raised.first + 3 * slot + c) for c in range(3)]
+        self._raised = len(raised.edge) > 0 and not {"drag", "added mass"}.isdisjoint(model.forces)
+        self._of_directors = [of.copy() for of in np.array(of_directors, dtype=np.int64).reshape(-1, 3).T]
         self._from, self._row, self._column = (of.copy() for of in np.array(entries, dtype=np.int64).T)
 
     def matrices(self, again: StepAgain, n: int) -> Lacking:
@@ -65,13 +76,15 @@ class Followed:
         rubbing = problem.rod_contact.exists and problem.rod_contact.sliding.count[0] > 0
         sliding = problem.sliding.exists and problem.sliding.count[0] > 0
         if not (rubbing or sliding or any("friction" not in name for name in self._forces)):
-            return None, None
+            return None, None, None
+        if sliding:
+            self._refuse_on_bodies(again)
         h = 0.1 * FINE * self._shortest
         if sliding or rubbing:
             threshold = (problem.sliding if problem.sliding.exists else problem.rod_contact).threshold
             h = min(h, FINE * threshold * stage.length, FINE * again.gap)
         h = 2.0 ** math.floor(math.log2(h))  # which positions take without rounding
-        alone = self._alone(problem.rod_contact.sliding) if rubbing else np.zeros(0, dtype=int)
+        alone = np.union1d(self._alone(problem.rod_contact.sliding), self._held) if rubbing else self._held
         colour, edge_colour = self._colours.copy(), self._edge_colours.copy()
         colour[alone] = COLOURS + np.arange(len(alone))
         edges = np.flatnonzero(np.isin(self._first, alone))
@@ -81,19 +94,49 @@ class Followed:
         differentiate_followed(problem, found, at, again.spare, stage, h)
         stage.origin_position[:], stage.origin_angle[:] = origin
         apart = again.of_nodes[alone].ravel(), again.of_edges[edges]
-        return self._entries(found.by_place, colours, apart), self._entries(found.by_origin, colours, apart)
+        bodies, rods = again.of_bodies.ravel(), len(found.by_origin)
+        by_place = self._entries(found.by_place[:rods], colours, apart).beside(found.by_place[rods:], bodies)
+        return (
+            by_place,
+            self._entries(found.by_origin, colours, apart),
+            self._by_director(again, found.by_director, edges),
+        )
+
+    def _by_director(self, again: StepAgain, rows: Array, edges: Array) -> Entries | None:
+        """Return differences by directors of raised edges as a matrix; some edges changed apart from others."""
+        if not len(rows):
+            return None
+        raised, size = again.problem.raised, again.size
+        place, row, column = self._of_directors
+        alone = np.flatnonzero(np.isin(raised.edge, edges))
+        value = rows[place, row]
+        of_alone = (raised.first + 3 * raised.slot[alone, None] + np.arange(3)).ravel()
+        value[np.isin(column, of_alone)] = 0.0
+        own = 3 * (COLOURS + np.searchsorted(edges, raised.edge[alone]))[:, None] + np.arange(3)
+        found = Entries(row, column, value, (size, again.stage.origin_strain.size))
+        return found.beside(rows[own.ravel()], of_alone)
+
+    def _refuse_on_bodies(self, again: StepAgain) -> None:
+        """Refuse friction on free bodies: its slip depends on their turns, too."""
+        surfaces, sliding, free = again.problem.surfaces, again.problem.sliding, again.problem.bodies.free_index
+        count = sliding.count[0]
+        bodies = surfaces.body[sliding.surface[:count]], surfaces.contact_point_body[sliding.first[:count]]
+        if any((free[of[of >= 0]] >= 0).any() for of in bodies):
+            raise InputError("gradient: a run is not differentiated through friction on a free body")
 
     def _differences(self, again: StepAgain, colour: Array, edge_colour: Array) -> Differences:
         """Return arrays for differences by unknowns of these colours."""
         colours = max(COLOURS, int(colour.max()) + 1)
         rows = colours * len(self._ways) + (max(COLOURS, int(edge_colour.max()) + 1) if self._turns else 0)
+        bodies = again.of_bodies.size
         return Differences(
             colours=colours,
             ways=self._ways,
             node_colour=colour,
             edge_colour=edge_colour,
-            by_place=np.zeros((rows, again.size)),
+            by_place=np.zeros((rows + bodies, again.size)),
             by_origin=np.zeros((rows, again.size)),
+            by_director=np.zeros((3 * (int(edge_colour.max()) + 1) if self._raised else 0, again.size)),
             by_law=np.zeros((0, 0)),
             pressing=self._pressing,
             following=self._following,
@@ -101,8 +144,11 @@ class Followed:
 
     def _alone(self, touching) -> Array:
         """Return nodes near which rods touch."""
-        nodes = touching.node[: touching.count[0]].ravel()
-        near = nodes[:, None] + np.arange(-REACH, REACH + 2)
+        return self._near(touching.node[: touching.count[0]].ravel(), 1)
+
+    def _near(self, nodes: Array, more: int) -> Array:
+        """Return nodes that see some, or `more` after them."""
+        near = nodes[:, None] + np.arange(-REACH, REACH + 1 + more)
         return np.intersect1d(near, np.append(self._first, self._first + 1))
 
     def _entries(self, rows: Array, colours: int, apart: tuple[Array, Array]) -> Entries:
@@ -116,13 +162,8 @@ class Followed:
         if not len(apart[0]):
             return Entries(self._row, self._column, value, (size, size))
         value[np.isin(self._column, np.concatenate(apart))] = 0.0
-        row, column, values = [self._row], [self._column], [value]
-        for own, unknowns in ((of_nodes[3 * COLOURS :], apart[0]), (of_edges[COLOURS:], apart[1])):
-            which, rows_of_own = np.nonzero(own)
-            row.append(rows_of_own)
-            column.append(unknowns[which])
-            values.append(own[which, rows_of_own])
-        return Entries(np.concatenate(row), np.concatenate(column), np.concatenate(values), (size, size))
+        found = Entries(self._row, self._column, value, (size, size))
+        return found.beside(of_nodes[3 * COLOURS :], apart[0]).beside(of_edges[COLOURS:], apart[1])
 
     def momentum(self, again: StepAgain, at: Configuration, velocity: Array) -> tuple[Entries, Entries]:
         """Return how the fluid's momentum depends on a configuration and on velocities, shapes (size, size)."""
@@ -138,5 +179,5 @@ class Followed:
                 np.add.at(inertia, fluid.edge_node + end, halves)
         row, column = (np.broadcast_to(of, inertia.shape).ravel() for of in (nodes[:, :, None], nodes[:, None, :]))
         nothing = np.zeros(0, dtype=int), np.zeros(0, dtype=int)
-        by_place = self._entries(found.by_place, COLOURS, nothing)
+        by_place = self._entries(found.by_place[: len(found.by_origin)], COLOURS, nothing)
         return by_place, Entries(row, column, inertia.ravel(), (size, size))

@@ -165,8 +165,10 @@ class RunResponse:
         model = self.model
         others = [name for name in model.forces if name not in DIFFERENTIATED]
         reasons = [f"the force {name!r}" for name in others]
-        if model.free_count:
-            reasons.append("free bodies")
+        if model.free_count and self._stepper.engine.methods[0].history:
+            reasons.append("free bodies with an integrator that keeps derivatives")
+        if model.free_count and not {"viscosity", "added mass"}.isdisjoint(model.forces):
+            reasons.append("free bodies beside viscosity or added mass")
         if len(model.joins.first):
             reasons.append("closed rods")
         if "added mass" in model.forces and self._stepper.engine.problem.raised.exists:
@@ -203,7 +205,7 @@ class RunResponse:
     def _begins_at_start(self) -> bool:
         """Return whether the run began at the start of its scene, which depends on the scene's numbers."""
         own, start = self._builders.state_of(self.model), self._course.start
-        parts = ("time", "position", "velocity", "director1", "spin", "transduction")
+        parts = ("time", "position", "velocity", "director1", "spin", "transduction", "body_position", "body_rotation")
         return all(np.array_equal(getattr(own, part), getattr(start, part)) for part in parts)
 
     @property
@@ -253,6 +255,10 @@ class RunResponse:
             if found.agains[0].end_rates.size != self._here.end_rates.size or not np.array_equal(*raised):
                 states = [self._builders.state_of(again.model) for again in found.agains]
                 found.rates = [(state.strain_rate, state.strain_acceleration) for state in states]
+        for again in found.agains:
+            own, others = self._here.problem, again.problem
+            if not np.array_equal(own.bodies.second_moment, others.bodies.second_moment):
+                raise InputError(f"gradient: {path} changes how free bodies turn, by which runs are not differentiated")
         if any(
             again.size != self._here.size or again.model.node_count != self.model.node_count for again in found.agains
         ):
@@ -280,8 +286,22 @@ class RunResponse:
             place[here.of_edges] = np.einsum("ki,ki->k", np.cross(tangent, director), rate("director1"))
             speed[here.of_edges] = rate("spin")
         speed[here.of_nodes] = rate("velocity")
+        free = here.problem.bodies.body_of_free
+        place[here.of_bodies[:, :3]] = rate("body_position")[free]
+        by_rotation = rate("body_rotation")[free] @ own.body_rotation[free].swapaxes(1, 2)  # [dφ]×
+        place[here.of_bodies[:, 3:]] = np.stack([by_rotation[:, j, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1)
+        speed[here.of_bodies[:, :3]] = rate("body_velocity")[free]
+        momenta = [self._momenta(of, state) for of, state in zip(number.agains, states, strict=False)]
+        if momenta and len(free):
+            speed[here.of_bodies[:, 3:]] = slope(momenta, h)
         rates = rate("strain_rate") if number.rates is None else np.zeros(here.end_rates.size)
-        return self._rates.constants.free @ place, speed, rates, rate("transduction")
+        return self._rates.constants.moves @ place, speed, rates, rate("transduction")
+
+    def _momenta(self, again: StepAgain, state: State) -> Array:
+        """Return the angular momenta of free bodies, shape (n_free, 3)."""
+        at = again.new()
+        again.take_state(state, at)
+        return again.start_point(state, at).angular_momentum.copy()
 
     def _direct(self, number: Number, step: KeptStep, reached: Sequence[Reached]) -> Direct:
         """Return what a number changes by itself in a step."""
@@ -363,8 +383,8 @@ class RunResponse:
         held = again.places[0]
         again.take_state(fitted, held)
         fitted.position[:] = held.position
-        moving = again.inputs.rates[0, constrained.body]
-        fitted.velocity[constrained.node] = moving[:, :3] + np.cross(moving[:, 3:], held.arm)
+        moving, led = again.inputs.rates[0, constrained.body], constrained.free < 0
+        fitted.velocity[constrained.node[led]] = (moving[:, :3] + np.cross(moving[:, 3:], held.arm))[led]
         carry_directors(model, state.position, fitted)
         return fitted
 
@@ -424,7 +444,7 @@ class RunResponse:
 
     def backward(self, seeds: Mapping[str, Array], numbers: Sequence[Number]) -> list[float]:
         """Return the derivative by each number of Σ seed · quantity at the end of the run."""
-        rates, here, free = self._rates, self._here, self._rates.constants.free
+        rates, here, free = self._rates, self._here, self._rates.constants.moves
         back = Rates.zeros(here, 1)
         nodes = self.model.node_count
         for name, seed in seeds.items():
@@ -492,9 +512,16 @@ class RunResponse:
         state = self._fitted(evaluator, self._course.end, number.rates and number.rates[0])
         at, there = evaluator.new(), evaluator.new()
         evaluator.take_state(state, at)
-        no_bodies = np.zeros_like(evaluator.problem.system.body_step)
-        evaluator.move(at, way * along.place[:, k], no_bodies, there)
+        momenta = self._momenta(evaluator, state)
+        evaluator.travel(at, way * along.place[:, k], there)
         evaluator.write_shape(there, state)
+        for f, b in enumerate(evaluator.problem.bodies.body_of_free):
+            of_body = evaluator.of_bodies[f]
+            state.body_velocity[b] += way * along.speed[of_body[:3], k]
+            second = state.body_rotation[b] @ evaluator.problem.bodies.second_moment[f] @ state.body_rotation[b].T
+            if second.any():
+                momentum = momenta[f] + way * along.speed[of_body[3:], k]
+                state.body_angular_velocity[b] = np.linalg.solve(np.trace(second) * np.eye(3) - second, momentum)
         state.velocity += way * along.speed[self._here.of_nodes, k]
         state.spin += way * along.speed[self._here.of_edges, k]
         if number.rates is None:

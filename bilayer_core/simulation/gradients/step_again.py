@@ -6,11 +6,13 @@ its stages follow from these; Newton's method then makes corrections that the ro
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.engine.linear.newton_matrix import solve
@@ -34,10 +36,12 @@ from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.surroundings import Surroundings
 
 Array = np.ndarray
-Lacking = tuple[Entries | None, Entries | None]
-"""What a Hessian lacks, and the gradient by the origin of a stage; None for nothing."""
+Lacking = tuple[Entries | None, Entries | None, Entries | None]
+"""What a Hessian lacks, and the gradient by the origin of a stage and directors there; None for nothing."""
 ROUNDS, ROUNDED = 80, 1e-13
 """Of solutions with what a Hessian lacks: the most there may be, and what may be left, of the whole."""
+SMALL = 1e-3
+"""Angles below which Jacobians are series [rad]."""
 MOST = 12
 """Corrections of a stage."""
 ENOUGH = 1e-13
@@ -72,12 +76,14 @@ class KeptStep:
 
 @dataclass(frozen=True)
 class Reached:
-    """Where a stage ended: positions of nodes, shape (n_node, 3), and turns of edges from its first guess, shape
-    (n_edge,).
+    """Where a stage ended: positions of nodes, shape (n_node, 3), turns of edges from its first guess, shape
+    (n_edge,), and poses of free bodies, shapes (n_free, 3), (n_free, 3, 3).
     """
 
     position: Array
     turn: Array
+    body_position: Array
+    body_rotation: Array
 
 
 class StepAgain(Evaluator):
@@ -121,7 +127,9 @@ class StepAgain(Evaluator):
         layout = self.problem.strands
         self.of_nodes = layout.node_unknown[:, None] + np.arange(3)
         self.of_edges = layout.edge_unknown
-        self.size = len(self.sums.gradient)
+        self._rods, bodies = len(self.sums.gradient), len(self.problem.bodies.mass)
+        self.size = self._rods + 6 * bodies
+        self.of_bodies = self._rods + np.arange(6 * bodies).reshape(bodies, 6)
         self.wet = self.size if self.problem.fluid.exists else 0
 
     def begin(self, step: KeptStep) -> None:
@@ -155,7 +163,7 @@ class StepAgain(Evaluator):
 
     @property
     def gained_momentum(self) -> Array:
-        """What the fluid's momentum has gained over the stage, shape (wet,)."""
+        """Gain of the fluid's momentum over the stage, shape (wet,)."""
         gained = np.zeros(self.wet)
         if self.wet:
             gained[self.of_nodes] = self._work.end.fluid_momentum - self._work.origin.fluid_momentum
@@ -178,14 +186,18 @@ class StepAgain(Evaluator):
 
     def go(self, n: int, reached: Reached) -> None:
         """Go from the first guess of stage n to where it ended."""
-        travel = np.zeros(self.size)
-        travel[self.of_nodes] = reached.position - self.guesses[n].position
+        travel, guess = np.zeros(self.size), self.guesses[n]
+        travel[self.of_nodes] = reached.position - guess.position
         travel[self.of_edges] = reached.turn
-        self._travel(self.guesses[n], travel, n)
-
-    def _travel(self, base: Configuration, travel: Array, n: int) -> None:
-        self.move(base, travel, self._no_bodies, self.places[n + 1])
+        travel[self.of_bodies[:, :3]] = reached.body_position - guess.body_position
+        for f, rotation in enumerate(reached.body_rotation):
+            travel[self.of_bodies[f, 3:]] = rotation_vector(rotation @ guess.body_rotation[f].T)
+        self.travel(guess, travel, self.places[n + 1])
         self.follow(self.places[n + 1])
+
+    def travel(self, base: Configuration, travel: Array, at: Configuration) -> None:
+        """Make a configuration `base`, moved by a step of all unknowns, shape (size,)."""
+        self.move(base, travel[: self._rods], travel[self._rods :].reshape(-1, 6), at)
 
     def follow(self, at: Configuration) -> None:
         """Let forces take from a configuration what they hold fixed."""
@@ -209,18 +221,27 @@ class StepAgain(Evaluator):
     def gradient(self, n: int) -> Array:
         """Return the gradient of the potential where stage n ended, shape (size,)."""
         self.evaluate(self.places[n + 1])
-        return self.sums.gradient.copy()
+        return self.whole_gradient()
+
+    def whole_gradient(self) -> Array:
+        """Return the gradient of the last evaluation, shape (size,)."""
+        return np.concatenate([self.sums.gradient, self.sums.body.ravel()])
+
+    @property
+    def turned(self) -> list[Array]:
+        """Rotation vectors of free bodies in earlier stages, from their origins, shapes (n_free, 3)."""
+        return [of[self.problem.bodies.body_of_free].copy() for of in self._work.gained_rotation_vector]
 
     def find(self, n: int, matrices: Callable[[StepAgain, int], Lacking]) -> tuple[Reached, float, Lacking]:
         """Go to where stage n ended, and factorise the Hessian there; return where, the last correction [m], and what
         the Hessian lacks there, as `matrices` has it.
         """
         self.go(n, self._expected(n))
-        lacking: Lacking = (None, None)
+        lacking: Lacking = (None, None, None)
         for k in range(MOST):
             at = self.places[n + 1]
             self.evaluate(at, second=True)
-            gradient = self.sums.gradient.copy()
+            gradient = self.whole_gradient()
             shift, simplified = self.factorise(at)
             if shift or simplified:
                 raise SimulationError("gradient: a step ends where the shape is unstable", self._step.begin)
@@ -228,17 +249,22 @@ class StepAgain(Evaluator):
                 lacking = matrices(self, n)
             travel = -self.solved(gradient[:, None], lacking[0])[:, 0]
             moved = np.abs(travel[self.of_nodes]).max()
-            moved = max(moved, self._size * np.abs(travel[self.of_edges]).max(initial=0.0))
+            turned = (
+                np.abs(travel[self.of_edges]).max(initial=0.0),
+                np.abs(travel[self.of_bodies[:, 3:]]).max(initial=0.0),
+            )
+            moved = max(moved, self._size * max(turned), np.abs(travel[self.of_bodies[:, :3]]).max(initial=0.0))
             if not moved > max(ENOUGH * self._size, self._settles * self._tolerance * self.stage.length):
                 break
-            self.move(at, travel, self._no_bodies, self.spare)
+            self.travel(at, travel, self.spare)
             self.places[n + 1], self.spare = self.spare, at
             self.follow(self.places[n + 1])
         if lacking[0] is None:
             lacking = matrices(self, n)
         at = self.places[n + 1]
         turn = at.total_angle - self.guesses[n].total_angle
-        return Reached(at.position.copy(), turn), float(moved), lacking
+        bodies = at.body_position.copy(), at.body_rotation.copy()
+        return Reached(at.position.copy(), turn, *bodies), float(moved), lacking
 
     def solved(self, right: Array, lacking: Entries | None) -> Array:
         """Return the inverse of the factorised Hessian and what it lacks together, times columns."""
@@ -246,14 +272,14 @@ class StepAgain(Evaluator):
         if lacking is not None:
             lack = Lack(row=lacking.row, column=lacking.column, value=lacking.value, **self._krylov)
         for k in range(right.shape[1]):
-            sums.gradient[:], sums.body[:] = right[:, k], 0.0
+            sums.gradient[:], sums.body[:] = right[: self._rods, k], right[self._rods :, k].reshape(-1, 6)
             if lacking is None:
                 solve(problem)
-                found[:, k] = -problem.system.step
             else:
                 solve_with_lack(problem, lack, ROUNDED)
-                found[:, k] = problem.system.step
-        return found
+            found[: self._rods, k] = problem.system.step
+            found[self._rods :, k] = problem.system.body_step.ravel()
+        return -found if lacking is None else found
 
     @cached_property
     def _krylov(self) -> dict[str, Array]:
@@ -279,8 +305,10 @@ class StepAgain(Evaluator):
         if self.problem.space.exists:
             there = tangents_of(self.problem.strands.edge_node, step.end.position)
             turn = turn_between(base.tangent[:edges], base.director1[:edges], there, step.end.director1)
+        free = self.problem.bodies.body_of_free
+        body, rotation = step.end.body_position[free], step.end.body_rotation[free]
         if end:
-            return Reached(step.end.position, turn)
+            return Reached(step.end.position, turn, body, rotation)
         moved = step.end.position - state.position - self.stage.length * step.end.velocity
         turned = turn - self.stage.length * step.end.spin
         if step.method.history:
@@ -289,7 +317,40 @@ class StepAgain(Evaluator):
             turned = turned - along * state.spin - bend * state.spin_acceleration
         coupling = step.method.couplings[n + 1, n]
         turned = work.origin.angle + turned / coupling - work.start_angle - guess.total_angle
-        return Reached(state.position + work.origin.displacement + moved / coupling, turned)
+        shift = body - state.body_position[free] - self.stage.length * step.end.body_velocity[free]
+        body = state.body_position[free] + work.origin.body_displacement[free] + shift / coupling
+        first = self.places[0].body_rotation
+        rotation = np.empty_like(first)
+        for f, b in enumerate(free):
+            whole = rotation_vector(step.end.body_rotation[b] @ first[f].T)
+            part = (whole - self.stage.length * step.end.body_angular_velocity[b]) / coupling
+            rotation[f] = rotation_of(part) @ work.origin.rotation[b]
+        return Reached(state.position + work.origin.displacement + moved / coupling, turned, body, rotation)
+
+
+def cross_matrix(v: Array) -> Array:
+    """Return [v]×, shape (3, 3)."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def left_jacobian(v: Array) -> Array:
+    """Return by what exp([v]×) turns more for an increment of v."""
+    angle, k = math.sqrt(float(v @ v)), cross_matrix(v)
+    if angle < SMALL:
+        first, second = 0.5 - angle**2 / 24.0, 1.0 / 6.0 - angle**2 / 120.0
+    else:
+        first, second = (1.0 - math.cos(angle)) / angle**2, (angle - math.sin(angle)) / angle**3
+    return np.eye(3) + first * k + second * (k @ k)
+
+
+def rotation_of(v: Array) -> Array:
+    """Return exp([v]×)."""
+    return np.eye(3) + cross_matrix(v) @ left_jacobian(v)
+
+
+def rotation_vector(rotation: Array) -> Array:
+    """Return v with exp([v]×), by less than half a turn."""
+    return Rotation.from_matrix(rotation).as_rotvec()
 
 
 def tangents_of(edge_node: Array, position: Array) -> Array:

@@ -32,6 +32,7 @@ from bilayer_core.engine.steps_again import Differences
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.scene.transduction import lagged
+from bilayer_core.simulation.gradients.body_rates import BodyRates
 from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.followed import FOLLOWING, Followed
 from bilayer_core.simulation.gradients.step_again import KeptStep, Lacking, Reached, StepAgain
@@ -129,7 +130,9 @@ class Constants:
         self.masses = self._masses(again)
         self.viscous = self._viscous(again)
         drag = sparse.diags(np.concatenate([np.zeros(self.size), self.viscous, np.zeros(again.wet)]))
-        self.dissipation = (self.damping * self.masses + drag).tocsr()
+        damped = np.ones(self.masses.shape[0])
+        damped[again.of_bodies] = 0.0
+        self.dissipation = (self.damping * sparse.diags(damped) @ self.masses + drag).tocsr()
         self.turn_inertia = self.spin_inertia
         if problem.fluid.exists and self.in_space:
             self.turn_inertia = self.spin_inertia + problem.fluid.mass[:, 2]
@@ -141,6 +144,10 @@ class Constants:
         free = np.ones(self.size)
         free[(problem.constrained.unknown[:, None] + np.arange(3)).ravel()] = 0.0
         self.free, self.freed = sparse.diags(free), free
+        moves = np.ones(self.size)  # where velocities depend on anything
+        prescribed = problem.constrained.free < 0
+        moves[(problem.constrained.unknown[prescribed, None] + np.arange(3)).ravel()] = 0.0
+        self.moves = sparse.diags(moves)
         self.groups = self._groups(again)
         drives = problem.drives
         rows = np.repeat(np.arange(len(drives.law_gain)), np.diff(drives.law_first))
@@ -153,11 +160,12 @@ class Constants:
         self.raised_rows = problem.raised.first + 3 * problem.raised.slot[:, None] + np.arange(3)
 
     def _masses(self, again: StepAgain) -> sparse.csr_matrix:
-        strands, raised = again.problem.strands, again.problem.raised
+        strands, raised, problem_bodies = again.problem.strands, again.problem.raised, again.problem.bodies
         whole = sparse.lil_matrix((self.size + self.strains + again.wet,) * 2)
         diagonal = np.zeros(self.size + self.strains + again.wet)
         diagonal[self.nodes] = strands.node_mass[:, None]
         diagonal[strands.edge_unknown] = self.spin_inertia
+        diagonal[again.of_bodies[:, :3]] = problem_bodies.mass[:, None]
         whole.setdiag(diagonal)
         for r, k in enumerate(raised.edge):
             i = strands.edge_node[k]
@@ -278,7 +286,9 @@ class StageRates:
     by_laws: Array  # ∂g/∂η
     lacking: Entries | None = None  # G
     by_turn: sparse.csr_matrix | None = None  # ∂g/∂a apart from the Hessian, shape (size, n_edge)
+    by_director: Entries | None = None  # ∂g by strains at the origin, by drag
     by_origin: Entries | None = None  # ∂g/∂Ȳ by the gyroscopic force, shape (size, size)
+    bodies: BodyRates | None = None
     momentum: tuple[Entries, Entries] | None = None  # of the fluid, by places at the end and by velocities
     way: tuple = ()  # of turns, by places at the start, at the first guess and at the end
     law_by_mode: Array = field(default_factory=lambda: np.zeros((0, 0)))
@@ -307,6 +317,7 @@ class StepRates:
             ways=none,
             by_place=none,
             by_origin=none,
+            by_director=none,
             by_law=np.zeros((len(agains[0].laws), agains[0].size)),
             pressing=np.zeros(0, dtype=bool),
             following=np.zeros(0, dtype=bool),
@@ -363,10 +374,15 @@ class StepRates:
     def _rates(self, again: StepAgain, n: int, followed: Lacking) -> StageRates:
         constants, stage, at = self.constants, again.stage, again.places[n + 1]
         found = StageRates(stage.length, stage.momentum_length, self._strains(again, at), self._by_laws(again, at))
+        if again.of_bodies.size:
+            found.bodies = BodyRates(again, at, self.step.method.couplings[n, :n], again.turned[:n])
         if constants.in_space:
             self._turning(again, n, found)
+            if found.bodies:
+                self._hold(found)
         if followed[0] is not None:
-            self._add_followed(found, *followed)
+            self._add_followed(found, *followed[:2])
+            found.by_director = followed[2]
         if again.wet:
             velocity = (at.position - stage.origin_position) / stage.length
             found.momentum = self._follower.momentum(again, at, velocity)
@@ -424,6 +440,13 @@ class StepRates:
             -by_turn @ constants.turns - pull @ _block_diagonal(scaled * _triple(t)) @ constants.vectors
         )
 
+    def _hold(self, found: StageRates) -> None:
+        """Let bodies take what acts on the nodes that they hold."""
+        spread = found.bodies.matrix()
+        found.lacking = Entries.of(spread.T @ found.lacking.matrix() @ spread)
+        found.by_turn = (spread.T @ found.by_turn).tocsr()
+        found.by_origin = Entries.of((spread.T @ found.by_origin.matrix()).tocsr())
+
     def _add_followed(self, found: StageRates, by_place: Entries, by_origin: Entries) -> None:
         """Add what forces take from the end of the stage, and their dependence on its origin.
 
@@ -433,7 +456,8 @@ class StepRates:
             of_origin = by_origin.matrix()
             by_turn = -of_origin[:, self._agains[0].of_edges]
             found.by_turn = found.by_turn + by_turn
-            by_place = Entries.of(by_place.matrix() + by_turn @ found.way[2] + found.lacking.matrix())
+            way = found.way[2] @ found.bodies.matrix() if found.bodies else found.way[2]
+            by_place = Entries.of(by_place.matrix() + by_turn @ way + found.lacking.matrix())
             by_origin = Entries.of(of_origin + found.by_origin.matrix())
         found.lacking, found.by_origin = by_place, by_origin
 
@@ -479,13 +503,14 @@ class StepRates:
         )
         first = np.concatenate([constants.free @ start.place, self._start_strains @ start.place, none])
         first[edges] = 0.0
-        speed = np.concatenate([constants.free @ start.speed, start.strain_rate, none])
+        speed = np.concatenate([constants.moves @ start.speed, start.strain_rate, none])
         if len(none):
             by_place, by_speed = self._start_momentum
             speed[fluid] = by_place @ start.place + by_speed @ speed[:size]
         push = np.concatenate([start.push, start.strain_push])
         place, turn = start.place, np.zeros((len(edges), start.place.shape[1]))
         gained: list[tuple[Array, Array]] = []
+        turned: list[tuple[Array, Array]] = []
         for n, stage in enumerate(self._stages):
             origin, origin_speed = first.copy(), speed.copy()
             for coupling, (of_place, of_speed) in zip(method.couplings[n], gained, strict=False):
@@ -494,6 +519,9 @@ class StepRates:
             if method.history:
                 origin += method.along[n] * h * speed + method.bend * h * h * push
                 origin_speed += method.momenta[n] * h * push
+            if bodies := stage.bodies:
+                bodies.turn_origin(first, origin, turned)
+                ahead = bodies.predict(origin, origin_speed)
             reached = stage.lag[0][:, None] * start.reached
             if len(constants.channel):
                 reached += stage.lag[1][:, None] * acts.first[constants.channel]
@@ -501,6 +529,9 @@ class StepRates:
             change = -constants.masses @ (origin + stage.length * origin_speed)
             change = change / (stage.length * stage.momentum_length) - constants.dissipation @ origin / stage.length
             right = change[:size] + stage.strains.pull_back(change[constants.of_strains])
+            if bodies:
+                right = bodies.gather(right)
+                bodies.push(ahead, right)
             if stage.momentum:
                 right -= origin_speed[fluid] / stage.momentum_length
             if len(stage.law_by_gain):
@@ -511,15 +542,24 @@ class StepRates:
             before = np.zeros_like(turn)
             if stage.way:
                 guess = constants.free @ (origin[:size] + stage.length * origin_speed[:size])
+                if bodies:
+                    bodies.guess(origin, origin_speed, ahead, guess)
                 before = turn - place[edges] + stage.way[0] @ place + stage.way[1] @ guess
                 right += stage.by_turn @ before
             if stage.by_origin is not None:
                 right += stage.by_origin @ origin[:size]
+            if stage.by_director is not None:
+                right += stage.by_director @ origin[constants.of_strains]
             moved = -self._agains[n].solved(constants.free @ right, stage.lacking)
+            if bodies:
+                moved = bodies.spread(moved)
             end = np.concatenate([moved, stage.strains @ moved, none])
             if stage.way:
                 end[edges] = before + moved[edges] + stage.way[2] @ moved
             end_speed = (end - origin) / stage.length
+            if bodies:
+                bodies.end(end, origin_speed, ahead, end_speed)
+                turned.append((end, origin))
             if stage.momentum:
                 end_speed[fluid] = stage.momentum[0] @ moved + stage.momentum[1] @ end_speed[:size]
             gained.append((end - origin, end_speed - origin_speed))
@@ -563,6 +603,8 @@ class StepRates:
             if stage.momentum:
                 end_speeds[n][:size] += stage.momentum[1].T @ of_momentum
                 places[n] += stage.momentum[0].T @ of_momentum
+            if bodies := stage.bodies:
+                ahead = bodies.end_back(ends[n], origin_speeds[n], end_speeds[n])
             ends[n] += end_speeds[n] / stage.length
             origins[n] -= end_speeds[n] / stage.length
             moved = places[n] + ends[n][:size] + stage.strains.pull_back(ends[n][constants.of_strains])
@@ -571,8 +613,12 @@ class StepRates:
                 moved += stage.way[2].T @ ends[n][edges]
                 before += ends[n][edges]
             transposed = None if stage.lacking is None else stage.lacking.T
-            right = direct[n] = -self._agains[n].solved(constants.free @ moved, transposed)
-            change = np.concatenate([right, stage.strains @ right, np.zeros_like(of_momentum)])
+            moved = bodies.gather(moved) if bodies else constants.free @ moved
+            right = direct[n] = -self._agains[n].solved(moved, transposed)
+            spread = bodies.spread(right) if bodies else right
+            change = np.concatenate([spread, stage.strains @ spread, np.zeros_like(of_momentum)])
+            if bodies:
+                ahead += bodies.push_back(right)
             if stage.momentum:
                 origin_speeds[n][fluid] -= right / stage.momentum_length
             of_mass = constants.masses @ change / (stage.length * stage.momentum_length)
@@ -589,9 +635,14 @@ class StepRates:
                 np.add.at(acts.stimulus[n], constants.channel, stage.lag[2][:, None] * reached)
             if stage.by_origin is not None:
                 origins[n][:size] += stage.by_origin.T @ right
+            if stage.by_director is not None:
+                origins[n][constants.of_strains] += stage.by_director.T @ right
             if stage.way:
                 before += stage.by_turn.T @ right
-                guess = constants.free @ (stage.way[1].T @ before)
+                guess = stage.way[1].T @ before
+                if bodies:
+                    bodies.guess_back(guess, origins[n], origin_speeds[n], ahead)
+                guess = constants.free @ guess
                 origins[n][:size] += guess
                 origin_speeds[n][:size] += stage.length * guess
                 of_start = stage.way[0].T @ before
@@ -601,6 +652,9 @@ class StepRates:
                     ends[n - 1][edges] += before
                 else:
                     start.place += of_start
+            if bodies:
+                bodies.predict_back(origins[n], origin_speeds[n], ahead)
+                bodies.turn_origin_back(first, origins[n], ends, origins)
             if method.history:
                 speed += method.along[n] * h * origins[n]
                 push += method.bend * h * h * origins[n] + method.momenta[n] * h * origin_speeds[n]
@@ -618,7 +672,7 @@ class StepRates:
             by_place, by_speed = self._start_momentum
             start.place += by_place.T @ speed[fluid]
             speed[:size] += by_speed.T @ speed[fluid]
-        start.speed += constants.free @ speed[:size]
+        start.speed += constants.moves @ speed[:size]
         start.strain_rate += speed[constants.of_strains]
         start.push, start.strain_push = push[:size], push[size:]
         return start, acts, direct

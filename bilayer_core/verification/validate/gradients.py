@@ -169,6 +169,8 @@ RUNS: dict[str, tuple[Any, ...]] = {
     "length, implicit euler": ("bending", SWELLING | EULER, 0.1, "rods.strip.path.length", "com", 1e-5),
     "viscosity": ("bending", SWELLING | VISCOUS, 0.2, "materials.active.retardation_time"),
     "fibres/gravity": ("chiral_pod", {}, 0.02, "gravity.2"),
+    "swimmer/density of the fluid": ("swimming", {}, 0.01, "fluid.density"),
+    "added mass/density of the fluid": ("flagellum", {}, 0.05, "fluid.density"),
     "drag/density of the fluid": ("flagellum", {"fluid.added_mass": False}, 0.05, "fluid.density"),
 }
 RUBBING: dict[str, tuple[Any, ...]] = {
