@@ -329,7 +329,7 @@ class StepAgain(Evaluator):
 
 
 def cross_matrix(v: Array) -> Array:
-    """Return [v]×, shape (3, 3)."""
+    """Return the matrix [v]×, shape (3, 3)."""
     return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
 
 
