@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 Array = np.ndarray
 
@@ -50,4 +53,6 @@ class Entries:
 
     def matrix(self) -> sparse.csr_matrix:
         """Return it as scipy has it."""
+        from scipy import sparse  # only where runs are differentiated
+
         return sparse.csr_matrix((self.value, (self.row, self.column)), shape=self.shape)

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.engine.linear.newton_matrix import solve
@@ -350,7 +349,9 @@ def rotation_of(v: Array) -> Array:
 
 def rotation_vector(rotation: Array) -> Array:
     """Return v with exp([v]×), by less than half a turn."""
-    return Rotation.from_matrix(rotation).as_rotvec()
+    axis = 0.5 * (rotation[[2, 0, 1], [1, 2, 0]] - rotation[[1, 2, 0], [2, 0, 1]])
+    size = math.sqrt(float(axis @ axis))
+    return axis * (math.atan2(size, 0.5 * (np.trace(rotation) - 1.0)) / size) if size > 0.0 else axis
 
 
 def tangents_of(edge_node: Array, position: Array) -> Array:
