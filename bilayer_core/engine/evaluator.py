@@ -111,6 +111,9 @@ class Evaluator:
 
     def _take(self, state: State) -> None:
         self._storage.set_friction(state.friction)
+        if state.places == self._state.places:
+            self._state.take(state)
+            return
         for name in StateArrays.names:
             if name != "values":
                 own, values = getattr(self._state, name), getattr(state, name)
@@ -219,7 +222,7 @@ class Evaluator:
 
     # forces
 
-    def _select(self, at: Configuration, forces: Iterable[str] | None) -> None:
+    def select(self, at: Configuration, forces: Iterable[str] | None) -> None:
         """Select the forces to compute, all that the scene has or some by name, and start the elements.
 
         Raises
@@ -251,7 +254,7 @@ class Evaluator:
     def _evaluate(
         self, at: Configuration, forces: Iterable[str] | None, *, second: bool, expands: bool
     ) -> dict[str, float]:
-        self._select(at, forces)
+        self.select(at, forces)
         while (status := evaluate_at(self.problem, at, self.stage, second, expands)) != READY:
             self._grow(status)
         outcome, sums = self._storage.outcome, self.sums

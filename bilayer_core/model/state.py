@@ -93,7 +93,11 @@ class State:
 
     def copy(self) -> State:
         """Return an independent state with the same values."""
-        return State(*(getattr(self, name) for name in PARTS))
+        copied = object.__new__(State)
+        copied.values, copied.places = self.values.copy(), self.places
+        for name, (begin, end, shape) in self.places.items():
+            setattr(copied, name, copied.values[begin:end].reshape(shape))
+        return copied
 
     def take(self, other: State) -> None:
         """Take all values of another state of the same model."""

@@ -588,7 +588,7 @@ class Simulator:
         progress: Callable[[float], None] | bool = False,
         each_step: Callable[[float], None] | None = None,
         interrupted: Callable[[], bool] | None = None,
-        gradients: bool = False,
+        gradients: bool | int = False,
     ) -> RunResult:
         """Advance by a duration or to a time (default: to the end of the scene), showing frames to observers.
 
@@ -623,8 +623,9 @@ class Simulator:
             Called with the simulated time [s] after each step, made one by one.
         interrupted : callable, optional
             Asked every few steps, and within long ones; true ends the run, as ``interrupted``, at the last step made.
-        gradients : bool
-            Keep the steps, made one by one, for `RunResult.gradient`.
+        gradients : bool or int
+            Keep the steps, made one by one, for `RunResult.gradient`: states of up to 256 MB, or of so many bytes;
+            steps between them are made again.
 
         Returns
         -------
@@ -647,9 +648,9 @@ class Simulator:
             output = self.scene.output
             observers = [McapRecorder(log, output.rate, output.marker_rate, overwrite), *observers]
         differentiable: DifferentiableRun | None = None
-        if gradients:
+        if gradients is not False:
             self.compile()
-            differentiable = DifferentiableRun(self._stepper, self._state, self._builders, self.description)
+            differentiable = DifferentiableRun(self._stepper, self._state, self._builders, self.description, gradients)
             each_step = differentiable.keeping(each_step)
         bar: AbstractContextManager[Any] = nullcontext(progress)
         if progress is True:

@@ -1,5 +1,7 @@
 """Derivatives of runs against differences of runs with the same steps."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -28,11 +30,25 @@ ON_A_POST = {
     "obstacles": [POST],
     "contact": {"barrier_distance": 2e-4, "stiffness": "1 MPa"},
 }
+WATER = {
+    "density": 1000.0,
+    "velocity": [0, 0.05, 0],
+    "drag_along": 0.01,
+    "drag_across": 1.0,
+    "drag_turning": 1.0,
+    "added_mass": False,
+}
+STILL_WATER, BODY = {"fluid.added_mass": False}, "rods.body.layers.active"
+JET = {"name": "jet", "rod": "strip", "position": 0.1, "force": [0, 0.01, 0.02], "frame": "material"}
 MOVES = {"bodies.wall.motion": {"type": "prescribed", "times": [0, 0.1], "displacements": [[0, 0, 0], [0, 0, 0.01]]}}
 EULER = {"solver.integrator": "implicit_euler", "solver.dt": 0.004, "solver.tolerance": None}
 ALPHA = {"solver.integrator": "generalised_alpha"}
 UNLIKE = {"solver.integrator": "tr_bdf2", THICKNESS: 1.5e-4}
 VISCOUS, SPACE = {VISCOSITY: 0.05}, {"solver.dimension": 3}
+HEAVY = {"fluid.added_mass": True}
+FREE = {"type": "free", "mass": "2 g", "inertia": ["0.3 g cm^2", "0.5 g cm^2", "0.7 g cm^2"]}
+TURNING = SPACE | {"bodies.wall.motion": FREE | {"angular_velocity": [3.0, 5.0, -4.0]}}
+IN_WATER = SPACE | {"fluid": WATER}
 CASES = {
     "in a plane": ("bending", HANGING, 0.2, [GAIN, LEVEL, TIME, MODULUS, THICKNESS, "gravity.2", LENGTH]),
     "in space": ("bending", HANGING | SPACE, 0.2, [GAIN, MODULUS, LENGTH]),
@@ -47,6 +63,19 @@ CASES = {
     "a clamp that moves": ("bending", HANGING | MOVES, 0.1, [GAIN, "bodies.wall.motion.displacements.1.2"]),
     "a strip that curls": ("bending", HANGING | {"rods.strip.section": "strip", LEVEL: 0.3}, 0.2, [GAIN, MODULUS]),
     "fibres in space": ("chiral_pod", {}, 0.02, ["gravity.2"]),
+    "drag in a plane": ("flagellum", STILL_WATER, 0.05, ["fluid.density", "materials.film.youngs_modulus"]),
+    "drag in space": ("bending", HANGING | IN_WATER, 0.1, [GAIN, "fluid.density"]),
+    "drag of turns": (
+        "bending",
+        SPACE | {"fluid": WATER, "loads": [JET]},
+        0.1,
+        ["loads.0.force.2", "fluid.velocity.1"],
+    ),
+}
+RUBBING = {
+    "a crawler": ("crawling_inchworm", {}, 0.05, [f"{BODY}.eigenstrain.gain", "contact.friction.forward"]),
+    "rods in space": ("knot", {}, 0.005, ["materials.rubber.density"]),
+    "a jumper": ("jumping", {}, 0.03, ["gravity.2"]),
 }
 STEPS = {LENGTH: 1e-5}
 """Differences of second order have their least errors with these, else with 1e-4."""
@@ -84,6 +113,16 @@ def test_gradients_of_runs_through_contact_agree_to_1e_4(to):
         assert error(found[name, to], other) < 1e-4, name
 
 
+@pytest.mark.parametrize("case", RUBBING)
+def test_gradients_of_runs_through_settled_friction_agree_to_1e_4(case):
+    name, overrides, duration, to = RUBBING[case]
+    simulator, result = kept_run(name, overrides, duration)
+    found = result.gradient("com", to)
+    for path in to:
+        (other,) = differences_of_runs(name, overrides, result.differentiable.made, path, 1e-5, ["com"])
+        assert error(found["com", path], other) < 1e-4, path
+
+
 def test_differences_of_runs_over_a_ladder_of_steps_reach_a_plateau_at_the_gradient():
     simulator, result = kept_run("bending", HANGING, 0.1)
     found, steps = result.gradient("com", THICKNESS)["com", THICKNESS], result.differentiable.made
@@ -102,6 +141,10 @@ BACK = {
     "fibres in space": ("chiral_pod", {}, 0.02, ["gravity.2"]),
     "generalised alpha": ("bending", HANGING | ALPHA | VISCOUS, 0.1, [GAIN, MODULUS]),
     "contact": ("bending", ON_A_POST, 0.2, [LEVEL, "obstacles.post.radius"]),
+    "friction": ("jumping", {}, 0.03, ["gravity.2"]),
+    "a body that turns": ("bending", HANGING | TURNING, 0.05, [GAIN, "gravity.2"]),
+    "added mass": ("flagellum", {}, 0.05, ["fluid.density"]),
+    "drag of turns": ("bending", IN_WATER | {"loads": [JET]}, 0.1, ["fluid.density"]),
 }
 
 
@@ -155,6 +198,36 @@ def test_steps_of_which_no_state_is_kept_are_made_again_bit_for_bit():
             assert one.method is other.method
 
 
+def test_gradients_do_not_depend_on_the_room_for_states():
+    found = [kept_run("bending", HANGING, 0.1)[1].gradient("com", GAIN)["com", GAIN]]
+    simulator = Simulator(load_scene("bending", TIGHT | HANGING))
+    result = simulator.run(0.1, gradients=5 * simulator._state.values.nbytes)
+    assert len(result.differentiable._course._spans) <= 5
+    assert np.array_equal(result.gradient("com", GAIN)["com", GAIN], found[0])
+
+
+@pytest.mark.parametrize("room", [0, -1, 1e6, "much"])
+def test_no_room_for_states_is_refused(room):
+    with pytest.raises(InputError, match="gradients: found .*; allowed are True, False and a number of bytes above 0"):
+        Simulator("bending").run(1e-2, gradients=room)
+
+
+def test_a_motion_that_forgets_its_start_is_told():
+    simulator, result = kept_run("bending", HANGING, 0.05)
+    seeds = {"positions": np.ones((simulator.model.node_count, 3))}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        result.pull_back(seeds, GAIN)
+        result.gradient("com", GAIN)
+    response = result.differentiable.response()
+    numbers = response.numbers([GAIN])[GAIN]
+    response._size = 1e-20
+    with pytest.warns(RuntimeWarning, match="forgets its start: at .* s derivatives have grown"):
+        response.forward(numbers)
+    with pytest.warns(RuntimeWarning, match="forgets its start: at .* s derivatives have grown"):
+        response.backward(seeds, numbers)
+
+
 def test_a_run_that_begins_elsewhere_begins_there_whatever_the_numbers_are():
     simulator = Simulator(load_scene("bending", HANGING))
     simulator.run(0.05)
@@ -167,8 +240,7 @@ def test_a_run_that_begins_elsewhere_begins_there_whatever_the_numbers_are():
 @pytest.mark.parametrize(
     ("name", "overrides", "to", "told"),
     [
-        ("crawling_inchworm", {}, "materials.film.density", "the force 'friction'"),
-        ("flagellum", {}, "fluid.viscosity", "the force 'drag', the force 'added mass'"),
+        ("ring", {}, "gravity.2", "closed rods"),
         ("arch", {}, "gravity.2", "free bodies"),
         ("bending", {"solver.integrator": "implicit_midpoint"}, GAIN, "end beyond their last stage"),
         ("bending", {"start": "settle"}, GAIN, "a start that settles"),

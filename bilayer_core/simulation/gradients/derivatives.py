@@ -108,10 +108,17 @@ class DifferentiableRun:
     builders : Builders
     description : Description
         Of the run.
+    room : bool or int
+        For states [bytes]; True for that of `Course`.
     """
 
-    def __init__(self, stepper: Stepper, state: State, builders: Builders, description: Description):
-        self._course, self._builders, self._description = Course(stepper, state), builders, description
+    def __init__(
+        self, stepper: Stepper, state: State, builders: Builders, description: Description, room: bool | int = True
+    ):
+        if room is not True and (not isinstance(room, int) or room < 1):
+            raise InputError(f"run: gradients: found {room!r}; allowed are True, False and a number of bytes above 0")
+        self._course = Course(stepper, state) if room is True else Course(stepper, state, room)
+        self._builders, self._description = builders, description
         self._model, self._gains = stepper.model, stepper.model.drives.law_gain.copy()
 
     def keeping(self, each_step: Callable[[float], None] | None) -> Callable[[float], None]:

@@ -12,17 +12,20 @@ directors, which count then, are those that the directors of the steps have.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from bilayer_core.engine.newton import SETTLED_WITHIN
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.model.model import Model
 from bilayer_core.model.state import PARTS, State
 from bilayer_core.observed.frame import Description
 from bilayer_core.simulation.gains import put_gains
 from bilayer_core.simulation.gradients.course import Course
+from bilayer_core.simulation.gradients.followed import FOLLOWING
 from bilayer_core.simulation.gradients.nearby import (
     PLACES,
     Builders,
@@ -55,12 +58,15 @@ DIFFERENTIATED = {
     "barrier",
     "rod barrier",
     "gyroscopic",
+    *FOLLOWING,
 }
 """Forces through which runs are differentiated."""
 SEEDS = ("positions", "velocities")
 """By which a derivative comes back from the end of a run."""
 AT_END = ("strain_rate", "reached", "strain_push")
 """Rates that a number changes by itself at the end of a step."""
+FORGETS = 1e6
+"""Lengths of the rod by which a derivative by a number, times its size, moves it."""
 NEAR = 1e-5
 """h of a number, over its size, where barriers are steep."""
 
@@ -159,10 +165,14 @@ class RunResponse:
         model = self.model
         others = [name for name in model.forces if name not in DIFFERENTIATED]
         reasons = [f"the force {name!r}" for name in others]
-        if model.free_count:
-            reasons.append("free bodies")
+        if model.free_count and self._stepper.engine.methods[0].history:
+            reasons.append("free bodies with an integrator that keeps derivatives")
+        if model.free_count and not {"viscosity", "added mass"}.isdisjoint(model.forces):
+            reasons.append("free bodies beside viscosity or added mass")
         if len(model.joins.first):
             reasons.append("closed rods")
+        if "added mass" in model.forces and self._stepper.engine.problem.raised.exists:
+            reasons.append("added mass of layers that are unlike")
         if any(
             len(method.couplings) > len(method.nodes) or method.couplings.shape[0] > method.couplings.shape[1]
             for method in self._stepper.engine.methods
@@ -182,12 +192,20 @@ class RunResponse:
 
     def _again(self, model: Model, surroundings: Surroundings | None = None) -> StepAgain:
         around = surroundings or Surroundings(model, self._stepper.ahead)
-        return StepAgain(model, around, self._stepper.same_time, self._stages, self._history)
+        stepper = self._stepper
+        return StepAgain(
+            model,
+            around,
+            stepper.same_time,
+            self._stages,
+            self._history,
+            SETTLED_WITHIN * stepper.steps.newton_tolerance,
+        )
 
     def _begins_at_start(self) -> bool:
         """Return whether the run began at the start of its scene, which depends on the scene's numbers."""
         own, start = self._builders.state_of(self.model), self._course.start
-        parts = ("time", "position", "velocity", "director1", "spin", "transduction")
+        parts = ("time", "position", "velocity", "director1", "spin", "transduction", "body_position", "body_rotation")
         return all(np.array_equal(getattr(own, part), getattr(start, part)) for part in parts)
 
     @property
@@ -237,6 +255,10 @@ class RunResponse:
             if found.agains[0].end_rates.size != self._here.end_rates.size or not np.array_equal(*raised):
                 states = [self._builders.state_of(again.model) for again in found.agains]
                 found.rates = [(state.strain_rate, state.strain_acceleration) for state in states]
+        for again in found.agains:
+            own, others = self._here.problem, again.problem
+            if not np.array_equal(own.bodies.second_moment, others.bodies.second_moment):
+                raise InputError(f"gradient: {path} changes how free bodies turn, by which runs are not differentiated")
         if any(
             again.size != self._here.size or again.model.node_count != self.model.node_count for again in found.agains
         ):
@@ -264,8 +286,22 @@ class RunResponse:
             place[here.of_edges] = np.einsum("ki,ki->k", np.cross(tangent, director), rate("director1"))
             speed[here.of_edges] = rate("spin")
         speed[here.of_nodes] = rate("velocity")
+        free = here.problem.bodies.body_of_free
+        place[here.of_bodies[:, :3]] = rate("body_position")[free]
+        by_rotation = rate("body_rotation")[free] @ own.body_rotation[free].swapaxes(1, 2)  # [dφ]×
+        place[here.of_bodies[:, 3:]] = np.stack([by_rotation[:, j, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1)
+        speed[here.of_bodies[:, :3]] = rate("body_velocity")[free]
+        momenta = [self._momenta(of, state) for of, state in zip(number.agains, states, strict=False)]
+        if momenta and len(free):
+            speed[here.of_bodies[:, 3:]] = slope(momenta, h)
         rates = rate("strain_rate") if number.rates is None else np.zeros(here.end_rates.size)
-        return self._rates.constants.free @ place, speed, rates, rate("transduction")
+        return self._rates.constants.moves @ place, speed, rates, rate("transduction")
+
+    def _momenta(self, again: StepAgain, state: State) -> Array:
+        """Return the angular momenta of free bodies, shape (n_free, 3)."""
+        at = again.new()
+        again.take_state(state, at)
+        return again.start_point(state, at).angular_momentum.copy()
 
     def _direct(self, number: Number, step: KeptStep, reached: Sequence[Reached]) -> Direct:
         """Return what a number changes by itself in a step."""
@@ -278,7 +314,7 @@ class RunResponse:
             [],
             np.zeros(here.end_rates.size),
             np.zeros(here.transduction.size),
-            np.zeros(here.end_rates.size),
+            np.zeros(here.end_rates.size + here.wet),
         )
         if number.laws.size:
             found.gain[number.laws] = 1.0
@@ -318,11 +354,12 @@ class RunResponse:
             again.finish(n)
         carry = step.method.carry
         push = (again.end_rates - again.origin_rates) / again.stage.momentum_length
+        of_fluid = again.gained_momentum / (again.stage.momentum_length * (1.0 - carry))
         if self._history:
             push = (push - carry * step.start.strain_acceleration) / (1.0 - carry)
             if not step.method.history:
                 push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
-        return [*gradients, again.transduction.copy(), again.end_rates.copy(), push]
+        return [*gradients, again.transduction.copy(), again.end_rates.copy(), np.concatenate([push, of_fluid])]
 
     def _fitted(self, again: StepAgain, state: State, rates: tuple[Array, Array] | None) -> State:
         """Return a state that a model with another number takes: with what only such models have, prescribed bodies
@@ -346,8 +383,8 @@ class RunResponse:
         held = again.places[0]
         again.take_state(fitted, held)
         fitted.position[:] = held.position
-        moving = again.inputs.rates[0, constrained.body]
-        fitted.velocity[constrained.node] = moving[:, :3] + np.cross(moving[:, 3:], held.arm)
+        moving, led = again.inputs.rates[0, constrained.body], constrained.free < 0
+        fitted.velocity[constrained.node[led]] = (moving[:, :3] + np.cross(moving[:, 3:], held.arm))[led]
         carry_directors(model, state.position, fitted)
         return fitted
 
@@ -364,7 +401,8 @@ class RunResponse:
         along = Rates.zeros(self._here, count)
         for k, number in enumerate(numbers):
             along.place[:, k], along.speed[:, k], along.strain_rate[:, k], along.reached[:, k] = self._start(number)
-        self._left = 0.0
+        self._left, self._forgets = 0.0, False
+        per = np.array([self._size / number.scale for number in numbers])
         for step in self._course.steps(self._maker):
             reached = rates.take(step)
             self._note(step, reached)
@@ -384,21 +422,29 @@ class RunResponse:
             along = rates.forward(along, acts, gradients)
             for part in AT_END:
                 getattr(along, part)[:] += np.stack([getattr(of, part) for of in direct], axis=-1)
-            self._look_at(along, step)
+            self._look_at(along, step, per, FORGETS)
         return along
 
     def _note(self, step: KeptStep, reached: Sequence[Reached]) -> None:
         self._left = max(self._left, float(np.abs(reached[-1].position - step.end.position).max()))
 
-    def _look_at(self, along: Rates, step: KeptStep) -> None:
-        """Refuse to go on where a motion has forgotten its start."""
-        largest = np.abs(along.place[self._here.of_nodes]).max(initial=0.0)
-        if not math.isfinite(largest):
+    def _look_at(self, rates: Rates, step: KeptStep, per: Array | float, most: float) -> None:
+        """Tell once where a motion has forgotten its start: where rates are `most` times `per` or more."""
+        grown = float((np.abs(rates.place[self._here.of_nodes]) / per).max(initial=0.0))
+        if not math.isfinite(grown):
             raise SimulationError("gradient: derivatives grow beyond all numbers", step.begin)
+        if grown > most and not self._forgets:
+            self._forgets = True
+            warnings.warn(
+                f"gradient: the motion forgets its start: at {step.begin:.6g} s derivatives have grown {grown:.2g} "
+                f"times, beyond {most:.2g}, where they tell nothing any more; differentiate a shorter run",
+                RuntimeWarning,
+                stacklevel=5,
+            )
 
     def backward(self, seeds: Mapping[str, Array], numbers: Sequence[Number]) -> list[float]:
         """Return the derivative by each number of Σ seed · quantity at the end of the run."""
-        rates, here, free = self._rates, self._here, self._rates.constants.free
+        rates, here, free = self._rates, self._here, self._rates.constants.moves
         back = Rates.zeros(here, 1)
         nodes = self.model.node_count
         for name, seed in seeds.items():
@@ -411,11 +457,14 @@ class RunResponse:
             (back.place if name == SEEDS[0] else back.speed)[here.of_nodes, 0] = given
         back.place, back.speed = free @ back.place, free @ back.speed
         begun = self._rates_at_starts([number for number in numbers if number.rates is not None])
-        found = np.zeros(len(numbers))
+        found, self._forgets = np.zeros(len(numbers)), False
+        given, tolerance = np.abs(back.place).max(), self._stepper.steps.newton_tolerance
         for step in self._course.steps(self._maker, backward=True):
             reached = rates.take(step)
             end = back
             back, acts, direct = rates.backward(end)
+            if given > 0.0:  # what Newton's method leaves then moves the end by more than the rod's length
+                self._look_at(back, step, given, self._size / (tolerance * step.length))
             for number, rates_at_starts in begun:
                 number.rates = rates_at_starts.pop()
             for k, number in enumerate(numbers):
@@ -463,9 +512,16 @@ class RunResponse:
         state = self._fitted(evaluator, self._course.end, number.rates and number.rates[0])
         at, there = evaluator.new(), evaluator.new()
         evaluator.take_state(state, at)
-        no_bodies = np.zeros_like(evaluator.problem.system.body_step)
-        evaluator.move(at, way * along.place[:, k], no_bodies, there)
+        momenta = self._momenta(evaluator, state)
+        evaluator.travel(at, way * along.place[:, k], there)
         evaluator.write_shape(there, state)
+        for f, b in enumerate(evaluator.problem.bodies.body_of_free):
+            of_body = evaluator.of_bodies[f]
+            state.body_velocity[b] += way * along.speed[of_body[:3], k]
+            second = state.body_rotation[b] @ evaluator.problem.bodies.second_moment[f] @ state.body_rotation[b].T
+            if second.any():
+                momentum = momenta[f] + way * along.speed[of_body[3:], k]
+                state.body_angular_velocity[b] = np.linalg.solve(np.trace(second) * np.eye(3) - second, momentum)
         state.velocity += way * along.speed[self._here.of_nodes, k]
         state.spin += way * along.speed[self._here.of_edges, k]
         if number.rates is None:

@@ -7,26 +7,44 @@ its stages follow from these; Newton's method then makes corrections that the ro
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from bilayer_core.engine.evaluator import Evaluator
+from bilayer_core.engine.linear.newton_matrix import solve
 from bilayer_core.engine.step_ends import end_stage
-from bilayer_core.engine.steps_again import begin_stage, begin_step
+from bilayer_core.engine.steps_again import (
+    Differences,
+    Lack,
+    begin_stage,
+    begin_step,
+    differentiate_by_laws,
+    follow,
+    solve_with_lack,
+)
 from bilayer_core.errors import SimulationError
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Method
 from bilayer_core.model.state import State
 from bilayer_core.simulation.edge_space import turn_between
+from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.surroundings import Surroundings
 
 Array = np.ndarray
+Lacking = tuple[Entries | None, Entries | None, Entries | None]
+"""What a Hessian lacks, and the gradient by the origin of a stage and directors there; None for nothing."""
+ROUNDS, ROUNDED = 80, 1e-13
+"""Of solutions with what a Hessian lacks: the most there may be, and what may be left, of the whole."""
+SMALL = 1e-3
+"""Angles below which Jacobians are series [rad]."""
 MOST = 12
 """Corrections of a stage."""
 ENOUGH = 1e-13
-"""Of the longest rod: a last correction."""
+"""Of the longest rod: a last correction. With friction the tolerance of the run is enough."""
 
 
 @dataclass(frozen=True)
@@ -57,12 +75,14 @@ class KeptStep:
 
 @dataclass(frozen=True)
 class Reached:
-    """Where a stage ended: positions of nodes, shape (n_node, 3), and turns of edges from its first guess, shape
-    (n_edge,).
+    """Where a stage ended: positions of nodes, shape (n_node, 3), turns of edges from its first guess, shape
+    (n_edge,), and poses of free bodies, shapes (n_free, 3), (n_free, 3, 3).
     """
 
     position: Array
     turn: Array
+    body_position: Array
+    body_rotation: Array
 
 
 class StepAgain(Evaluator):
@@ -79,6 +99,8 @@ class StepAgain(Evaluator):
         Of a step, at most.
     history : bool
         Whether the integrator keeps stage derivatives.
+    tolerance : float
+        Of Newton's method [m/s].
 
     Attributes
     ----------
@@ -86,19 +108,28 @@ class StepAgain(Evaluator):
         The start of the step, then the end of each stage.
     guesses : list of Configuration
         Where Newton's method began in each stage.
+    size, wet : int
+        Of unknowns, and of the fluid's momentum in their places.
     """
 
-    def __init__(self, model: Model, surroundings: Surroundings, same: float, stages: int, history: bool):
+    def __init__(
+        self, model: Model, surroundings: Surroundings, same: float, stages: int, history: bool, tolerance: float
+    ):
         super().__init__(model, stages, history)
         self.surroundings, self._same = surroundings, same
         self.places: list[Configuration] = [self.new() for _ in range(stages + 1)]
         self.guesses: list[Configuration] = [self.new() for _ in range(stages)]
-        self._spare = self.new()
+        self.spare = self.new()
         self._size = max(rod.path.length for rod in model.scene.rods)
+        self._tolerance = tolerance
+        self._settles = not {"friction", "rod friction"}.isdisjoint(model.forces)
         layout = self.problem.strands
         self.of_nodes = layout.node_unknown[:, None] + np.arange(3)
         self.of_edges = layout.edge_unknown
-        self.size = len(self.sums.gradient)
+        self._rods, bodies = len(self.sums.gradient), len(self.problem.bodies.mass)
+        self.size = self._rods + 6 * bodies
+        self.of_bodies = self._rods + np.arange(6 * bodies).reshape(bodies, 6)
+        self.wet = self.size if self.problem.fluid.exists else 0
 
     def begin(self, step: KeptStep) -> None:
         """Take the start of a step, with what acts during it."""
@@ -130,6 +161,14 @@ class StepAgain(Evaluator):
         return self._work.end.strain_rate
 
     @property
+    def gained_momentum(self) -> Array:
+        """Gain of the fluid's momentum over the stage, shape (wet,)."""
+        gained = np.zeros(self.wet)
+        if self.wet:
+            gained[self.of_nodes] = self._work.end.fluid_momentum - self._work.origin.fluid_momentum
+        return gained
+
+    @property
     def origin_rates(self) -> Array:
         """Rates of strains at its origin, likewise."""
         return self._work.origin.strain_rate
@@ -146,14 +185,26 @@ class StepAgain(Evaluator):
 
     def go(self, n: int, reached: Reached) -> None:
         """Go from the first guess of stage n to where it ended."""
-        travel = np.zeros(self.size)
-        travel[self.of_nodes] = reached.position - self.guesses[n].position
+        travel, guess = np.zeros(self.size), self.guesses[n]
+        travel[self.of_nodes] = reached.position - guess.position
         travel[self.of_edges] = reached.turn
-        self._travel(self.guesses[n], travel, n)
+        travel[self.of_bodies[:, :3]] = reached.body_position - guess.body_position
+        for f, rotation in enumerate(reached.body_rotation):
+            travel[self.of_bodies[f, 3:]] = rotation_vector(rotation @ guess.body_rotation[f].T)
+        self.travel(guess, travel, self.places[n + 1])
+        self.follow(self.places[n + 1])
 
-    def _travel(self, base: Configuration, travel: Array, n: int) -> None:
-        self.move(base, travel, self._no_bodies, self.places[n + 1])
-        self.update_lagged(self.places[n + 1])
+    def travel(self, base: Configuration, travel: Array, at: Configuration) -> None:
+        """Make a configuration `base`, moved by a step of all unknowns, shape (size,)."""
+        self.move(base, travel[: self._rods], travel[self._rods :].reshape(-1, 6), at)
+
+    def follow(self, at: Configuration) -> None:
+        """Let forces take from a configuration what they hold fixed."""
+        if self._settles:
+            self.select(at, None)
+            follow(self.problem, at, self.stage)
+        else:
+            self.update_lagged(at)
 
     @property
     def _no_bodies(self) -> Array:
@@ -169,38 +220,94 @@ class StepAgain(Evaluator):
     def gradient(self, n: int) -> Array:
         """Return the gradient of the potential where stage n ended, shape (size,)."""
         self.evaluate(self.places[n + 1])
-        return self.sums.gradient.copy()
+        return self.whole_gradient()
 
-    def find(self, n: int) -> tuple[Reached, float]:
-        """Go to where stage n ended, and factorise the Hessian there; return where, and the last correction [m]."""
-        at, spare, moved = self.places[n + 1], self._spare, math.inf
+    def whole_gradient(self) -> Array:
+        """Return the gradient of the last evaluation, shape (size,)."""
+        return np.concatenate([self.sums.gradient, self.sums.body.ravel()])
+
+    @property
+    def turned(self) -> list[Array]:
+        """Rotation vectors of free bodies in earlier stages, from their origins, shapes (n_free, 3)."""
+        return [of[self.problem.bodies.body_of_free].copy() for of in self._work.gained_rotation_vector]
+
+    def find(self, n: int, matrices: Callable[[StepAgain, int], Lacking]) -> tuple[Reached, float, Lacking]:
+        """Go to where stage n ended, and factorise the Hessian there; return where, the last correction [m], and what
+        the Hessian lacks there, as `matrices` has it.
+        """
         self.go(n, self._expected(n))
-        for _ in range(MOST):
+        lacking: Lacking = (None, None, None)
+        for k in range(MOST):
+            at = self.places[n + 1]
             self.evaluate(at, second=True)
+            gradient = self.whole_gradient()
             shift, simplified = self.factorise(at)
             if shift or simplified:
                 raise SimulationError("gradient: a step ends where the shape is unstable", self._step.begin)
-            travel = self.newton_step(self.sums.gradient, self._no_bodies)[0]
+            if k and self._settles:
+                lacking = matrices(self, n)
+            travel = -self.solved(gradient[:, None], lacking[0])[:, 0]
             moved = np.abs(travel[self.of_nodes]).max()
-            moved = max(moved, self._size * np.abs(travel[self.of_edges]).max(initial=0.0))
-            if not moved > ENOUGH * self._size:
+            turned = (
+                np.abs(travel[self.of_edges]).max(initial=0.0),
+                np.abs(travel[self.of_bodies[:, 3:]]).max(initial=0.0),
+            )
+            moved = max(moved, self._size * max(turned), np.abs(travel[self.of_bodies[:, :3]]).max(initial=0.0))
+            if not moved > max(ENOUGH * self._size, self._settles * self._tolerance * self.stage.length):
                 break
-            self.move(at, travel, self._no_bodies, spare)
-            at, spare = spare, at
-            self.update_lagged(at)
-        self.places[n + 1], self._spare = at, spare
+            self.travel(at, travel, self.spare)
+            self.places[n + 1], self.spare = self.spare, at
+            self.follow(self.places[n + 1])
+        if lacking[0] is None:
+            lacking = matrices(self, n)
+        at = self.places[n + 1]
         turn = at.total_angle - self.guesses[n].total_angle
-        return Reached(at.position.copy(), turn), float(moved)
+        bodies = at.body_position.copy(), at.body_rotation.copy()
+        return Reached(at.position.copy(), turn, *bodies), float(moved), lacking
+
+    def solved(self, right: Array, lacking: Entries | None) -> Array:
+        """Return the inverse of the factorised Hessian and what it lacks together, times columns."""
+        problem, sums, found = self.problem, self.sums, np.empty(right.shape)
+        if lacking is not None:
+            lack = Lack(row=lacking.row, column=lacking.column, value=lacking.value, **self._krylov)
+        for k in range(right.shape[1]):
+            sums.gradient[:], sums.body[:] = right[: self._rods, k], right[self._rods :, k].reshape(-1, 6)
+            if lacking is None:
+                solve(problem)
+            else:
+                solve_with_lack(problem, lack, ROUNDED)
+            found[: self._rods, k] = problem.system.step
+            found[self._rods :, k] = problem.system.body_step.ravel()
+        return -found if lacking is None else found
+
+    @cached_property
+    def _krylov(self) -> dict[str, Array]:
+        """Scratch of `Lack`."""
+        return {
+            "basis": np.zeros((ROUNDS + 1, self.size)),
+            "projected": np.zeros((ROUNDS, ROUNDS + 1)),
+            "turns": np.zeros((ROUNDS, 2)),
+            "rest": np.zeros(ROUNDS + 1),
+        }
+
+    def differentiate_by_laws(self, at: Configuration, differences: Differences, change: float) -> None:
+        """Write how the gradient at a configuration depends on the eigenstrain of each law; see `Differences`."""
+        self.select(at, None)
+        differentiate_by_laws(self.problem, self._work, differences, at, change)
 
     def _expected(self, n: int) -> Reached:
         """Return where stage n ended, as far as both ends of the step tell."""
         step, state, work, guess = self._step, self._step.start, self._work, self.guesses[n]
         edges, h, end = len(self.of_edges), step.length, n + 1 == len(step.method.couplings)
         base = guess if end else self.places[0]
-        there = tangents_of(self.problem.strands.edge_node, step.end.position)
-        turn = turn_between(base.tangent[:edges], base.director1[:edges], there, step.end.director1)
+        turn = np.zeros(edges)
+        if self.problem.space.exists:
+            there = tangents_of(self.problem.strands.edge_node, step.end.position)
+            turn = turn_between(base.tangent[:edges], base.director1[:edges], there, step.end.director1)
+        free = self.problem.bodies.body_of_free
+        body, rotation = step.end.body_position[free], step.end.body_rotation[free]
         if end:
-            return Reached(step.end.position, turn)
+            return Reached(step.end.position, turn, body, rotation)
         moved = step.end.position - state.position - self.stage.length * step.end.velocity
         turned = turn - self.stage.length * step.end.spin
         if step.method.history:
@@ -209,7 +316,42 @@ class StepAgain(Evaluator):
             turned = turned - along * state.spin - bend * state.spin_acceleration
         coupling = step.method.couplings[n + 1, n]
         turned = work.origin.angle + turned / coupling - work.start_angle - guess.total_angle
-        return Reached(state.position + work.origin.displacement + moved / coupling, turned)
+        shift = body - state.body_position[free] - self.stage.length * step.end.body_velocity[free]
+        body = state.body_position[free] + work.origin.body_displacement[free] + shift / coupling
+        first = self.places[0].body_rotation
+        rotation = np.empty_like(first)
+        for f, b in enumerate(free):
+            whole = rotation_vector(step.end.body_rotation[b] @ first[f].T)
+            part = (whole - self.stage.length * step.end.body_angular_velocity[b]) / coupling
+            rotation[f] = rotation_of(part) @ work.origin.rotation[b]
+        return Reached(state.position + work.origin.displacement + moved / coupling, turned, body, rotation)
+
+
+def cross_matrix(v: Array) -> Array:
+    """Return the matrix [v]×, shape (3, 3)."""
+    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def left_jacobian(v: Array) -> Array:
+    """Return by what exp([v]×) turns more for an increment of v."""
+    angle, k = math.sqrt(float(v @ v)), cross_matrix(v)
+    if angle < SMALL:
+        first, second = 0.5 - angle**2 / 24.0, 1.0 / 6.0 - angle**2 / 120.0
+    else:
+        first, second = (1.0 - math.cos(angle)) / angle**2, (angle - math.sin(angle)) / angle**3
+    return np.eye(3) + first * k + second * (k @ k)
+
+
+def rotation_of(v: Array) -> Array:
+    """Return exp([v]×)."""
+    return np.eye(3) + cross_matrix(v) @ left_jacobian(v)
+
+
+def rotation_vector(rotation: Array) -> Array:
+    """Return v with exp([v]×), by less than half a turn."""
+    axis = 0.5 * (rotation[[2, 0, 1], [1, 2, 0]] - rotation[[1, 2, 0], [2, 0, 1]])
+    size = math.sqrt(float(axis @ axis))
+    return axis * (math.atan2(size, 0.5 * (np.trace(rotation) - 1.0)) / size) if size > 0.0 else axis
 
 
 def tangents_of(edge_node: Array, position: Array) -> Array:

@@ -28,14 +28,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import sparse
 
+from bilayer_core.engine.steps_again import Differences
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.scene.transduction import lagged
-from bilayer_core.simulation.gradients.step_again import KeptStep, Reached, StepAgain
+from bilayer_core.simulation.gradients.body_rates import BodyRates
+from bilayer_core.simulation.gradients.entries import Entries
+from bilayer_core.simulation.gradients.followed import FOLLOWING, Followed
+from bilayer_core.simulation.gradients.step_again import KeptStep, Lacking, Reached, StepAgain
 
 Array = np.ndarray
-ROUNDS, ROUNDED = 60, 1e-15
-"""Of what a Hessian lacks: the most there may be, and the largest change of the last one, of the whole."""
 STRAIN = 1e-3
 """Change of eigenstrains and of strains by which derivatives are read off."""
 
@@ -55,7 +57,7 @@ class Rates:
     reached : ndarray
         What modes have reached of stimuli, shape (n_mode, n).
     push, strain_push : ndarray
-        Rates of velocities and of rates of strains that a history keeps, likewise.
+        Rates of velocities, and of rates of strains and of the fluid's momentum, that a history keeps, likewise.
     """
 
     place: Array
@@ -69,7 +71,7 @@ class Rates:
     def zeros(cls, again: StepAgain, columns: int) -> Rates:
         """Return rates of a model without any."""
         strains, modes = again.stage.origin_strain.size, again.transduction.size
-        sizes = again.size, again.size, strains, modes, again.size, strains
+        sizes = again.size, again.size, strains, modes, again.size, strains + again.wet
         return cls(*(np.zeros((size, columns)) for size in sizes))
 
 
@@ -127,11 +129,25 @@ class Constants:
         self.damping = problem.damping
         self.masses = self._masses(again)
         self.viscous = self._viscous(again)
-        drag = sparse.diags(np.concatenate([np.zeros(self.size), self.viscous]))
-        self.dissipation = (self.damping * self.masses + drag).tocsr()
+        drag = sparse.diags(np.concatenate([np.zeros(self.size), self.viscous, np.zeros(again.wet)]))
+        damped = np.ones(self.masses.shape[0])
+        damped[again.of_bodies] = 0.0
+        self.dissipation = (self.damping * sparse.diags(damped) @ self.masses + drag).tocsr()
+        self.turn_inertia = self.spin_inertia
+        if problem.fluid.exists and self.in_space:
+            self.turn_inertia = self.spin_inertia + problem.fluid.mass[:, 2]
+            of_fluid = np.zeros(self.masses.shape[0])
+            of_fluid[strands.edge_unknown] = problem.fluid.mass[:, 2]
+            self.masses = (self.masses + sparse.diags(of_fluid)).tocsr()
+        self.of_strains = slice(self.size, self.size + self.strains)
+        self.of_fluid = slice(self.size + self.strains, self.size + self.strains + again.wet)
         free = np.ones(self.size)
         free[(problem.constrained.unknown[:, None] + np.arange(3)).ravel()] = 0.0
-        self.free = sparse.diags(free)
+        self.free, self.freed = sparse.diags(free), free
+        moves = np.ones(self.size)  # where velocities depend on anything
+        prescribed = problem.constrained.free < 0
+        moves[(problem.constrained.unknown[prescribed, None] + np.arange(3)).ravel()] = 0.0
+        self.moves = sparse.diags(moves)
         self.groups = self._groups(again)
         drives = problem.drives
         rows = np.repeat(np.arange(len(drives.law_gain)), np.diff(drives.law_first))
@@ -144,11 +160,12 @@ class Constants:
         self.raised_rows = problem.raised.first + 3 * problem.raised.slot[:, None] + np.arange(3)
 
     def _masses(self, again: StepAgain) -> sparse.csr_matrix:
-        strands, raised = again.problem.strands, again.problem.raised
-        whole = sparse.lil_matrix((self.size + self.strains,) * 2)
-        diagonal = np.zeros(self.size + self.strains)
+        strands, raised, problem_bodies = again.problem.strands, again.problem.raised, again.problem.bodies
+        whole = sparse.lil_matrix((self.size + self.strains + again.wet,) * 2)
+        diagonal = np.zeros(self.size + self.strains + again.wet)
         diagonal[self.nodes] = strands.node_mass[:, None]
         diagonal[strands.edge_unknown] = self.spin_inertia
+        diagonal[again.of_bodies[:, :3]] = problem_bodies.mass[:, None]
         whole.setdiag(diagonal)
         for r, k in enumerate(raised.edge):
             i = strands.edge_node[k]
@@ -209,24 +226,39 @@ class Constants:
         blocks = (np.eye(3) - t[:, :, None] * t[:, None, :]) / at.length[:edges, None, None]
         return _block_diagonal(blocks) @ self.vectors
 
-    def strain_rates(self, again: StepAgain, at: Configuration, per_viscous: Array) -> sparse.csr_matrix:
-        """Return ∂σ/∂q, of viscous elements as given, and of directors of raised edges."""
-        found, raised = per_viscous, again.problem.raised
-        if not len(raised.edge):
-            return found
-        k = raised.edge
-        t, m1, m2 = at.tangent[k], at.director1[k], at.director2[k]
-        along = -t[:, :, None] * m1[:, None, :] / at.length[k, None, None]
-        unknowns = self.nodes[again.problem.strands.edge_node[k][:, None] + np.array([0, 1])]
-        rows = np.broadcast_to(self.raised_rows[:, None, :, None], (len(k), 2, 3, 3))
-        columns = np.broadcast_to(unknowns[:, :, None, :], (len(k), 2, 3, 3))
-        values = along[:, None] * np.array([-1.0, 1.0])[None, :, None, None]
-        parts = [(values.ravel(), rows.ravel(), columns.ravel())]
-        if self.in_space:
-            turned = np.broadcast_to(again.of_edges[k][:, None], (len(k), 3))
-            parts.append((m2.ravel(), self.raised_rows.ravel(), turned.ravel()))
-        data, row, column = (np.concatenate(of) for of in zip(*parts, strict=True))
-        return found + sparse.csr_matrix((data, (row, column)), shape=(self.strains, self.size))
+
+class Strains:
+    """∂σ/∂q at a configuration: of viscous elements as given, and of directors of raised edges."""
+
+    def __init__(self, constants: Constants, again: StepAgain, at: Configuration, viscous: sparse.csr_matrix | None):
+        self._constants, self._viscous, k = constants, viscous, again.problem.raised.edge
+        self._exist, nodes = len(k) > 0, constants.nodes
+        if not self._exist:
+            return
+        t, m1, first = at.tangent[k], at.director1[k], again.problem.strands.edge_node[k]
+        self._along = -t[:, :, None] * m1[:, None, :] / at.length[k, None, None]
+        self._before, self._after, self._turn = nodes[first], nodes[first + 1], again.of_edges[k]
+        self._across = at.director2[k][:, :, None] * float(constants.in_space)
+
+    def __matmul__(self, place: Array) -> Array:
+        constants = self._constants
+        found = np.zeros((constants.strains, place.shape[1])) if self._viscous is None else self._viscous @ place
+        if self._exist:
+            moved = self._along @ (place[self._after] - place[self._before])
+            found[constants.raised_rows] = moved + self._across * place[self._turn][:, None, :]
+        return found
+
+    def pull_back(self, strains: Array) -> Array:
+        """Return the transpose times columns."""
+        constants = self._constants
+        found = np.zeros((constants.size, strains.shape[1])) if self._viscous is None else self._viscous.T @ strains
+        if self._exist:
+            own = strains[constants.raised_rows]
+            pulled = self._along.swapaxes(1, 2) @ own  # each node is before one edge and after one
+            found[self._after] += pulled
+            found[self._before] -= pulled
+            found[self._turn] += (self._across * own).sum(axis=1)
+        return found
 
 
 def _block_diagonal(blocks: Array) -> sparse.csr_matrix:
@@ -250,11 +282,14 @@ class StageRates:
 
     length: float
     momentum_length: float
-    strains: sparse.csr_matrix
+    strains: Strains
     by_laws: Array  # ∂g/∂η
-    lacking: sparse.csr_matrix | None = None  # G
+    lacking: Entries | None = None  # G
     by_turn: sparse.csr_matrix | None = None  # ∂g/∂a apart from the Hessian, shape (size, n_edge)
-    by_origin: sparse.csr_matrix | None = None  # ∂g/∂Ȳ by the gyroscopic force, shape (size, size)
+    by_director: Entries | None = None  # ∂g by strains at the origin, by drag
+    by_origin: Entries | None = None  # ∂g/∂Ȳ by the gyroscopic force, shape (size, size)
+    bodies: BodyRates | None = None
+    momentum: tuple[Entries, Entries] | None = None  # of the fluid, by places at the end and by velocities
     way: tuple = ()  # of turns, by places at the start, at the first guess and at the end
     law_by_mode: Array = field(default_factory=lambda: np.zeros((0, 0)))
     law_by_gain: Array = field(default_factory=lambda: np.zeros(0))
@@ -275,6 +310,21 @@ class StepRates:
         self._agains = agains
         self.constants = Constants(model, agains[0])
         self.residual = 0.0
+        none = np.zeros((0, 0))
+        empty = {name: np.zeros(0, dtype=np.int64) for name in ("node_colour", "edge_colour")}
+        self._differences = Differences(
+            colours=0,
+            ways=none,
+            by_place=none,
+            by_origin=none,
+            by_director=none,
+            by_law=np.zeros((len(agains[0].laws), agains[0].size)),
+            pressing=np.zeros(0, dtype=bool),
+            following=np.zeros(0, dtype=bool),
+            **empty,
+        )
+        self._follower = Followed(model, agains[0])
+        self._moving = [n for n in (*FOLLOWING, "inertia", "damping") if n in model.forces]
         self._moduli = agains[0].problem.moduli.exists or agains[0].problem.flattening.exists
 
     def take(self, step: KeptStep) -> list[Reached]:
@@ -289,42 +339,56 @@ class StepRates:
                 again.finish(earlier)
             again.start(n)
             if n == 0:
-                again.evaluate(again.places[0])
                 self._start_strains = self._strains(again, again.places[0])
-            place, correction = again.find(n)
+                if again.wet:
+                    self._start_momentum = self._follower.momentum(again, again.places[0], step.start.velocity)
+            place, correction, followed = again.find(n, self._follower.matrices)
             reached.append(place)
             self.residual = max(self.residual, correction / step.length)
-            self._stages.append(self._rates(again, n))
+            self._stages.append(self._rates(again, n, followed))
         return reached
 
-    def _strains(self, again: StepAgain, at: Configuration) -> sparse.csr_matrix:
-        """Return ∂σ/∂q at a configuration, with the gradient there evaluated."""
+    def _strains(self, again: StepAgain, at: Configuration) -> Strains:
+        """Return ∂σ/∂q at a configuration, with the gradient there evaluated where strains are viscous."""
         constants, stage = self.constants, again.stage
+        if not constants.groups:
+            return Strains(constants, again, at, None)
         data, rows, columns = [np.zeros(0)], [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)]
-        if constants.groups:
-            before, origin = again.sums.gradient.copy(), stage.origin_strain.copy()
-            for group in constants.groups:
-                for k, _ in group:
-                    stage.origin_strain[k] -= STRAIN
-                again.evaluate(at)
-                change = again.sums.gradient - before
-                stage.origin_strain[:] = origin
-                for k, seen in group:
-                    data.append(change[seen] * (stage.length / (STRAIN * constants.viscous[k])))
-                    rows.append(np.full(len(seen), k))
-                    columns.append(seen)
+        again.evaluate(at)
+        before, origin = again.sums.gradient.copy(), stage.origin_strain.copy()
+        for group in constants.groups:
+            for k, _ in group:
+                stage.origin_strain[k] -= STRAIN
             again.evaluate(at)
+            change = again.sums.gradient - before
+            stage.origin_strain[:] = origin
+            for k, seen in group:
+                data.append(change[seen] * (stage.length / (STRAIN * constants.viscous[k])))
+                rows.append(np.full(len(seen), k))
+                columns.append(seen)
+        again.evaluate(at)
         where = np.concatenate(rows), np.concatenate(columns)
         shape = (constants.strains, constants.size)
-        viscous = sparse.csr_matrix((np.concatenate(data), where), shape=shape)
-        return constants.strain_rates(again, at, viscous)
+        return Strains(constants, again, at, sparse.csr_matrix((np.concatenate(data), where), shape=shape))
 
-    def _rates(self, again: StepAgain, n: int) -> StageRates:
+    def _rates(self, again: StepAgain, n: int, followed: Lacking) -> StageRates:
         constants, stage, at = self.constants, again.stage, again.places[n + 1]
-        again.evaluate(at)
         found = StageRates(stage.length, stage.momentum_length, self._strains(again, at), self._by_laws(again, at))
+        if again.of_bodies.size:
+            found.bodies = BodyRates(again, at, self.step.method.couplings[n, :n], again.turned[:n])
         if constants.in_space:
             self._turning(again, n, found)
+            if found.bodies:
+                self._hold(found)
+        if followed[0] is not None:
+            self._add_followed(found, *followed[:2])
+            found.by_director = followed[2]
+        if again.wet:
+            velocity = (at.position - stage.origin_position) / stage.length
+            found.momentum = self._follower.momentum(again, at, velocity)
+            again.follow(at)
+        if found.lacking is not None:
+            found.lacking = found.lacking.masked(constants.freed)
         drives, laws = again.problem.drives, again.laws
         if len(laws):
             slope = 1.0 - (laws / drives.law_saturation) ** 2
@@ -335,22 +399,10 @@ class StepRates:
 
     def _by_laws(self, again: StepAgain, at: Configuration) -> Array:
         """Return ∂g/∂η, shape (size, n_law)."""
-        laws, stage, drives = again.laws, again.stage, again.problem.drives
-        columns = np.zeros((self.constants.size, len(laws)))
-        edge, joint = stage.rest_edge.copy(), stage.rest_joint.copy()
-        for i in range(len(laws)):
-            sides = []
-            for sign in (1.0, -1.0):
-                own = drives.driven_law == i
-                np.add.at(stage.rest_edge, drives.driven_edge[own], sign * STRAIN * drives.driven_weight[own])
-                own = drives.driven_joint_law == i
-                where = drives.driven_joint[own], drives.driven_joint_column[own]
-                np.add.at(stage.rest_joint, where, sign * STRAIN * drives.driven_joint_weight[own])
-                again.evaluate(at)
-                sides.append(again.sums.gradient.copy())
-                stage.rest_edge[:], stage.rest_joint[:] = edge, joint
-            columns[:, i] = (sides[0] - sides[1]) / (2.0 * STRAIN)
-        return columns
+        if not len(again.laws):
+            return np.zeros((self.constants.size, 0))
+        again.differentiate_by_laws(at, self._differences, STRAIN)
+        return self._differences.by_law.T.copy()
 
     def _turning(self, again: StepAgain, n: int, found: StageRates) -> None:
         """Add what the turns of edges, and their gyroscopic force, ask for."""
@@ -374,21 +426,40 @@ class StepRates:
         columns = np.repeat(np.arange(edges), 3)
         of_turn = sparse.csr_matrix(((factor * around).ravel(), (np.arange(3 * edges), columns)))
         by_turn = pull @ of_turn
-        spin = constants.spin_inertia * (1.0 / stage.momentum_length + constants.damping) / stage.length
+        spin = constants.turn_inertia / stage.momentum_length + constants.damping * constants.spin_inertia
+        spin = spin / stage.length
         both = by_turn + constants.turns.T @ sparse.diags(spin)
-        ahead = (
-            spin * at.total_angle
-            - constants.spin_inertia / (stage.length * stage.momentum_length) * stage.predicted_angle
-        )
-        ahead -= constants.spin_inertia * constants.damping / stage.length * stage.origin_angle
+        again.forces(at, self._moving)
+        ahead = again.sums.edge[:edges, 3]  # moments of forces that see turns since the start of the stage
         by_vector += 0.5 * _triple(t) * (ahead / at.length[:edges] ** 2)[:, None, None]
-        found.lacking = (
+        found.lacking = Entries.of(
             both @ by_end + by_turn @ constants.turns + pull @ _block_diagonal(by_vector) @ constants.vectors
-        ).tocsr()
+        )
         found.by_turn = both.tocsr()
-        found.by_origin = (
+        found.by_origin = Entries.of(
             -by_turn @ constants.turns - pull @ _block_diagonal(scaled * _triple(t)) @ constants.vectors
-        ).tocsr()
+        )
+
+    def _hold(self, found: StageRates) -> None:
+        """Let bodies take what acts on the nodes that they hold."""
+        spread = found.bodies.matrix()
+        found.lacking = Entries.of(spread.T @ found.lacking.matrix() @ spread)
+        found.by_turn = (spread.T @ found.by_turn).tocsr()
+        found.by_origin = Entries.of((spread.T @ found.by_origin.matrix()).tocsr())
+
+    def _add_followed(self, found: StageRates, by_place: Entries, by_origin: Entries) -> None:
+        """Add what forces take from the end of the stage, and their dependence on its origin.
+
+        They depend on turns over the stage: by the turn at its end as by that at its origin, but for the sign.
+        """
+        if found.way:
+            of_origin = by_origin.matrix()
+            by_turn = -of_origin[:, self._agains[0].of_edges]
+            found.by_turn = found.by_turn + by_turn
+            way = found.way[2] @ found.bodies.matrix() if found.bodies else found.way[2]
+            by_place = Entries.of(by_place.matrix() + by_turn @ way + found.lacking.matrix())
+            by_origin = Entries.of(of_origin + found.by_origin.matrix())
+        found.lacking, found.by_origin = by_place, by_origin
 
     def _lag(self, again: StepAgain, n: int) -> Array:
         """Return what each mode takes of what it had reached, of the first stimulus and of that of the stage."""
@@ -409,7 +480,7 @@ class StepRates:
         size, raised = self.constants.size, self._agains[0].problem.raised
         if self.step.method.history:
             return slice(0, 0)
-        return slice(size, size + raised.first if raised.exists else None)
+        return slice(size, size + (raised.first if raised.exists else self.constants.strains))
 
     # forward
 
@@ -426,12 +497,20 @@ class StepRates:
         """
         constants, method, h = self.constants, self.step.method, self.step.length
         size, edges = constants.size, self._agains[0].of_edges
-        first = np.concatenate([constants.free @ start.place, self._start_strains @ start.place])
+        none, fluid = (
+            np.zeros((constants.masses.shape[0] - constants.of_fluid.start, start.place.shape[1])),
+            constants.of_fluid,
+        )
+        first = np.concatenate([constants.free @ start.place, self._start_strains @ start.place, none])
         first[edges] = 0.0
-        speed = np.concatenate([constants.free @ start.speed, start.strain_rate])
+        speed = np.concatenate([constants.moves @ start.speed, start.strain_rate, none])
+        if len(none):
+            by_place, by_speed = self._start_momentum
+            speed[fluid] = by_place @ start.place + by_speed @ speed[:size]
         push = np.concatenate([start.push, start.strain_push])
         place, turn = start.place, np.zeros((len(edges), start.place.shape[1]))
         gained: list[tuple[Array, Array]] = []
+        turned: list[tuple[Array, Array]] = []
         for n, stage in enumerate(self._stages):
             origin, origin_speed = first.copy(), speed.copy()
             for coupling, (of_place, of_speed) in zip(method.couplings[n], gained, strict=False):
@@ -440,13 +519,21 @@ class StepRates:
             if method.history:
                 origin += method.along[n] * h * speed + method.bend * h * h * push
                 origin_speed += method.momenta[n] * h * push
+            if bodies := stage.bodies:
+                bodies.turn_origin(first, origin, turned)
+                ahead = bodies.predict(origin, origin_speed)
             reached = stage.lag[0][:, None] * start.reached
             if len(constants.channel):
                 reached += stage.lag[1][:, None] * acts.first[constants.channel]
                 reached += stage.lag[2][:, None] * acts.stimulus[n, constants.channel]
             change = -constants.masses @ (origin + stage.length * origin_speed)
             change = change / (stage.length * stage.momentum_length) - constants.dissipation @ origin / stage.length
-            right = change[:size] + stage.strains.T @ change[size:]
+            right = change[:size] + stage.strains.pull_back(change[constants.of_strains])
+            if bodies:
+                right = bodies.gather(right)
+                bodies.push(ahead, right)
+            if stage.momentum:
+                right -= origin_speed[fluid] / stage.momentum_length
             if len(stage.law_by_gain):
                 laws = stage.law_by_mode @ reached + stage.law_by_gain[:, None] * acts.gain
                 right += stage.by_laws @ laws
@@ -455,36 +542,32 @@ class StepRates:
             before = np.zeros_like(turn)
             if stage.way:
                 guess = constants.free @ (origin[:size] + stage.length * origin_speed[:size])
+                if bodies:
+                    bodies.guess(origin, origin_speed, ahead, guess)
                 before = turn - place[edges] + stage.way[0] @ place + stage.way[1] @ guess
-                right += stage.by_turn @ before + stage.by_origin @ origin[:size]
-            moved = -self._solved(n, right, stage.lacking)
-            end = np.concatenate([moved, stage.strains @ moved])
+                right += stage.by_turn @ before
+            if stage.by_origin is not None:
+                right += stage.by_origin @ origin[:size]
+            if stage.by_director is not None:
+                right += stage.by_director @ origin[constants.of_strains]
+            moved = -self._agains[n].solved(constants.free @ right, stage.lacking)
+            if bodies:
+                moved = bodies.spread(moved)
+            end = np.concatenate([moved, stage.strains @ moved, none])
             if stage.way:
                 end[edges] = before + moved[edges] + stage.way[2] @ moved
             end_speed = (end - origin) / stage.length
+            if bodies:
+                bodies.end(end, origin_speed, ahead, end_speed)
+                turned.append((end, origin))
+            if stage.momentum:
+                end_speed[fluid] = stage.momentum[0] @ moved + stage.momentum[1] @ end_speed[:size]
             gained.append((end - origin, end_speed - origin_speed))
             place, turn = moved, end[edges]
         kept = (end_speed - origin_speed) / stage.momentum_length
         kept = (kept - method.carry * push) / (1.0 - method.carry)
         kept[self._forgotten] = 0.0
-        return Rates(place, end_speed[:size], end_speed[size:], reached, kept[:size], kept[size:])
-
-    def _solved(self, n: int, right: Array, lacking: sparse.csr_matrix | None) -> Array:
-        """Return the inverse of the matrix of stage n times columns."""
-        again, no_bodies = self._agains[n], self._agains[n]._no_bodies
-
-        def by_hessian(columns: Array) -> Array:
-            return np.stack([-again.newton_step(column, no_bodies)[0] for column in columns.T], axis=1)
-
-        free = self.constants.free
-        found = by_hessian(free @ right)
-        for _ in range(ROUNDS if lacking is not None else 0):
-            new = by_hessian(free @ (right - lacking @ found))
-            change = np.abs(new - found).max(axis=0) > ROUNDED * np.abs(new).max(axis=0)
-            found = new
-            if not change.any():
-                break
-        return found
+        return Rates(place, end_speed[:size], end_speed[constants.of_strains], reached, kept[:size], kept[size:])
 
     # backward
 
@@ -496,7 +579,7 @@ class StepRates:
         size, edges, columns = constants.size, self._agains[0].of_edges, end.place.shape[1]
         start = Rates.zeros(self._agains[0], columns)
         acts = Inputs.zeros(self._agains[0], len(self._stages), columns)
-        push = np.zeros((size + constants.strains, columns))
+        push, fluid = np.zeros((constants.masses.shape[0], columns)), constants.of_fluid
         first, speed = np.zeros_like(push), np.zeros_like(push)
         count = len(self._stages)
         ends = [np.zeros_like(push) for _ in range(count)]
@@ -509,20 +592,35 @@ class StepRates:
         kept = np.concatenate([end.push, end.strain_push]) / (1.0 - method.carry)
         kept[self._forgotten] = 0.0
         push -= method.carry * kept
-        end_speeds[-1] += np.concatenate([end.speed, end.strain_rate]) + kept / self._stages[-1].momentum_length
+        end_speeds[-1] += kept / self._stages[-1].momentum_length
+        end_speeds[-1][:size] += end.speed
+        end_speeds[-1][constants.of_strains] += end.strain_rate
         origin_speeds[-1] -= kept / self._stages[-1].momentum_length
         for n in reversed(range(count)):
             stage = self._stages[n]
+            of_momentum = end_speeds[n][fluid].copy()
+            end_speeds[n][fluid] = 0.0
+            if stage.momentum:
+                end_speeds[n][:size] += stage.momentum[1].T @ of_momentum
+                places[n] += stage.momentum[0].T @ of_momentum
+            if bodies := stage.bodies:
+                ahead = bodies.end_back(ends[n], origin_speeds[n], end_speeds[n])
             ends[n] += end_speeds[n] / stage.length
             origins[n] -= end_speeds[n] / stage.length
-            moved = places[n] + ends[n][:size] + stage.strains.T @ ends[n][size:]
+            moved = places[n] + ends[n][:size] + stage.strains.pull_back(ends[n][constants.of_strains])
             before = np.zeros((len(edges), columns))
             if stage.way:
                 moved += stage.way[2].T @ ends[n][edges]
                 before += ends[n][edges]
-            transposed = None if stage.lacking is None else stage.lacking.T.tocsr()
-            right = direct[n] = -self._solved(n, moved, transposed)
-            change = np.concatenate([right, stage.strains @ right])
+            transposed = None if stage.lacking is None else stage.lacking.T
+            moved = bodies.gather(moved) if bodies else constants.free @ moved
+            right = direct[n] = -self._agains[n].solved(moved, transposed)
+            spread = bodies.spread(right) if bodies else right
+            change = np.concatenate([spread, stage.strains @ spread, np.zeros_like(of_momentum)])
+            if bodies:
+                ahead += bodies.push_back(right)
+            if stage.momentum:
+                origin_speeds[n][fluid] -= right / stage.momentum_length
             of_mass = constants.masses @ change / (stage.length * stage.momentum_length)
             origins[n] -= of_mass + constants.dissipation @ change / stage.length
             origin_speeds[n] -= stage.length * of_mass
@@ -535,10 +633,16 @@ class StepRates:
             if len(constants.channel):
                 np.add.at(acts.first, constants.channel, stage.lag[1][:, None] * reached)
                 np.add.at(acts.stimulus[n], constants.channel, stage.lag[2][:, None] * reached)
+            if stage.by_origin is not None:
+                origins[n][:size] += stage.by_origin.T @ right
+            if stage.by_director is not None:
+                origins[n][constants.of_strains] += stage.by_director.T @ right
             if stage.way:
                 before += stage.by_turn.T @ right
-                origins[n][:size] += stage.by_origin.T @ right
-                guess = constants.free @ (stage.way[1].T @ before)
+                guess = stage.way[1].T @ before
+                if bodies:
+                    bodies.guess_back(guess, origins[n], origin_speeds[n], ahead)
+                guess = constants.free @ guess
                 origins[n][:size] += guess
                 origin_speeds[n][:size] += stage.length * guess
                 of_start = stage.way[0].T @ before
@@ -548,6 +652,9 @@ class StepRates:
                     ends[n - 1][edges] += before
                 else:
                     start.place += of_start
+            if bodies:
+                bodies.predict_back(origins[n], origin_speeds[n], ahead)
+                bodies.turn_origin_back(first, origins[n], ends, origins)
             if method.history:
                 speed += method.along[n] * h * origins[n]
                 push += method.bend * h * h * origins[n] + method.momenta[n] * h * origin_speeds[n]
@@ -560,8 +667,12 @@ class StepRates:
                 end_speeds[j] += coupling * origin_speeds[n]
                 origin_speeds[j] -= coupling * origin_speeds[n]
         first[edges] = 0.0
-        start.place += constants.free @ first[:size] + self._start_strains.T @ first[size:]
-        start.speed += constants.free @ speed[:size]
-        start.strain_rate += speed[size:]
+        start.place += constants.free @ first[:size] + self._start_strains.pull_back(first[constants.of_strains])
+        if fluid.stop > fluid.start:
+            by_place, by_speed = self._start_momentum
+            start.place += by_place.T @ speed[fluid]
+            speed[:size] += by_speed.T @ speed[fluid]
+        start.speed += constants.moves @ speed[:size]
+        start.strain_rate += speed[constants.of_strains]
         start.push, start.strain_push = push[:size], push[size:]
         return start, acts, direct

@@ -169,9 +169,22 @@ RUNS: dict[str, tuple[Any, ...]] = {
     "length, implicit euler": ("bending", SWELLING | EULER, 0.1, "rods.strip.path.length", "com", 1e-5),
     "viscosity": ("bending", SWELLING | VISCOUS, 0.2, "materials.active.retardation_time"),
     "fibres/gravity": ("chiral_pod", {}, 0.02, "gravity.2"),
+    "swimmer/density of the fluid": ("swimming", {}, 0.01, "fluid.density"),
+    "added mass/density of the fluid": ("flagellum", {}, 0.05, "fluid.density"),
+    "drag/density of the fluid": ("flagellum", {"fluid.added_mass": False}, 0.05, "fluid.density"),
+}
+RUBBING: dict[str, tuple[Any, ...]] = {
+    "inchworm/gain": ("crawling_inchworm", {}, 0.05, "rods.body.layers.active.eigenstrain.gain"),
+    "inchworm/friction": ("crawling_inchworm", {}, 0.05, "contact.friction.forward"),
+    "knot/density": ("knot", {}, 0.005, "materials.rubber.density"),
+    "jumper/gravity": ("jumping", {}, 0.03, "gravity.2"),
 }
 CASES = (
     *(Case(f"gradients/runs/{name}", "differences of runs", 1e-6, end_of_run(*of)) for name, of in RUNS.items()),
+    *(
+        Case(f"gradients/runs/friction/{name}", "differences of runs", 1e-4, end_of_run(*of, "com", 1e-5))
+        for name, of in RUBBING.items()
+    ),
     Case(
         "gradients/runs/contact/stimulus",
         "differences of runs",

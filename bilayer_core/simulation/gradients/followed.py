@@ -1,0 +1,183 @@
+"""How forces that follow the configuration change the derivatives of a stage: friction, drag, loads that turn.
+
+In Newton's method they hold fixed what they took from the configuration, and the Hessian knows nothing of that. A stage
+ends where what they took is that of the end. So its matrix lacks ∂g/∂z ∂z/∂q, with z what they take, and its gradient
+depends on the origin of the stage by velocities. Both are differences of the gradient of these forces: unknowns that
+no row sees together change at once, and those of rods that touch one by one.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bilayer_core.engine.steps_again import Differences, differentiate_followed, differentiate_momentum
+from bilayer_core.errors import InputError
+from bilayer_core.model.force_slots import NAMES
+from bilayer_core.model.model import Model
+from bilayer_core.model.records.step import Configuration
+from bilayer_core.simulation.gradients.entries import Entries
+from bilayer_core.simulation.gradients.step_again import Lacking, StepAgain
+
+Array = np.ndarray
+FOLLOWING = ("drag", "turning drag", "added mass", "followers", "friction", "rod friction")
+PRESSING = ("barrier", "rod barrier")
+"""On which friction depends."""
+REACH = 2
+"""Nodes along a strand over which such a force at one depends on another."""
+COLOURS = 2 * REACH + 1
+FINE = 1e-5
+"""Of the slip within which friction rests, of the smallest gap, and of a tenth of an edge: steps of differences."""
+
+
+class Followed:
+    """Derivatives of the forces of a model that follow the configuration."""
+
+    def __init__(self, model: Model, again: StepAgain):
+        self._forces = [name for name in FOLLOWING if name in model.forces]
+        if not self._forces:
+            return
+        pressing = [name for name in PRESSING if name in model.forces]
+        self._pressing, self._following = (
+            np.array([name in chosen for name in NAMES]) for chosen in (pressing, self._forces)
+        )
+        strands, nodes = again.problem.strands, len(again.of_nodes)
+        self._first, self._ways = strands.edge_node[: len(again.of_edges)], np.asarray(strands.axes)
+        self._turns = again.problem.space.exists
+        self._colours, self._edge_colours = np.arange(nodes) % COLOURS, self._first % COLOURS
+        self._shortest = float(strands.rest_length.min())
+        held = again.problem.constrained.node[again.problem.constrained.free >= 0]
+        self._held = self._near(held, 0)
+        strand = np.zeros(nodes, dtype=int)
+        strand[1:] = np.cumsum(~np.isin(np.arange(nodes - 1), self._first))
+        station = [(again.of_nodes[i], again.of_edges[self._first == i]) for i in range(nodes)]
+        entries: list[tuple[int, int, int]] = []  # row of differences, row and column of the matrix
+        for i in range(nodes):
+            near = [j for j in range(max(i - REACH, 0), min(i + REACH + 1, nodes)) if strand[j] == strand[i]]
+            seen, colour = np.concatenate([part for j in near for part in station[j]]), i % COLOURS
+            for c in range(3):
+                entries += [(3 * colour + c, row, again.of_nodes[i, c]) for row in seen]
+            for unknown in station[i][1] if self._turns else ():
+                entries += [(3 * COLOURS + colour, row, unknown) for row in seen]
+        raised, of_directors = again.problem.raised, [(0, 0, 0)][:0]
+        for edge, slot in zip(raised.edge, raised.slot, strict=True):
+            i = self._first[edge]
+            near = [j for j in range(max(i - REACH, 0), min(i + REACH + 2, nodes)) if strand[j] == strand[i]]
+            for row in np.concatenate([part for j in near for part in station[j]]):
+                of_directors += [(3 * (i % COLOURS) + c, row, raised.first + 3 * slot + c) for c in range(3)]
+        self._raised = len(raised.edge) > 0 and not {"drag", "added mass"}.isdisjoint(model.forces)
+        self._of_directors = [of.copy() for of in np.array(of_directors, dtype=np.int64).reshape(-1, 3).T]
+        self._from, self._row, self._column = (of.copy() for of in np.array(entries, dtype=np.int64).T)
+
+    def matrices(self, again: StepAgain, n: int) -> Lacking:
+        """Return ∂g/∂z ∂z/∂q where stage n ended, and ∂g by the origin of the stage, shapes (size, size)."""
+        problem, stage, at = again.problem, again.stage, again.places[n + 1]
+        rubbing = problem.rod_contact.exists and problem.rod_contact.sliding.count[0] > 0
+        sliding = problem.sliding.exists and problem.sliding.count[0] > 0
+        if not (rubbing or sliding or any("friction" not in name for name in self._forces)):
+            return None, None, None
+        if sliding:
+            self._refuse_on_bodies(again)
+        h = 0.1 * FINE * self._shortest
+        if sliding or rubbing:
+            threshold = (problem.sliding if problem.sliding.exists else problem.rod_contact).threshold
+            h = min(h, FINE * threshold * stage.length, FINE * again.gap)
+        h = 2.0 ** math.floor(math.log2(h))  # which positions take without rounding
+        alone = np.union1d(self._alone(problem.rod_contact.sliding), self._held) if rubbing else self._held
+        colour, edge_colour = self._colours.copy(), self._edge_colours.copy()
+        colour[alone] = COLOURS + np.arange(len(alone))
+        edges = np.flatnonzero(np.isin(self._first, alone))
+        edge_colour[edges] = COLOURS + np.arange(len(edges))
+        found, colours = self._differences(again, colour, edge_colour), COLOURS + len(alone)
+        origin = stage.origin_position.copy(), stage.origin_angle.copy()
+        differentiate_followed(problem, found, at, again.spare, stage, h)
+        stage.origin_position[:], stage.origin_angle[:] = origin
+        apart = again.of_nodes[alone].ravel(), again.of_edges[edges]
+        bodies, rods = again.of_bodies.ravel(), len(found.by_origin)
+        by_place = self._entries(found.by_place[:rods], colours, apart).beside(found.by_place[rods:], bodies)
+        return (
+            by_place,
+            self._entries(found.by_origin, colours, apart),
+            self._by_director(again, found.by_director, edges),
+        )
+
+    def _by_director(self, again: StepAgain, rows: Array, edges: Array) -> Entries | None:
+        """Return differences by directors of raised edges as a matrix; some edges changed apart from others."""
+        if not len(rows):
+            return None
+        raised, size = again.problem.raised, again.size
+        place, row, column = self._of_directors
+        alone = np.flatnonzero(np.isin(raised.edge, edges))
+        value = rows[place, row]
+        of_alone = (raised.first + 3 * raised.slot[alone, None] + np.arange(3)).ravel()
+        value[np.isin(column, of_alone)] = 0.0
+        own = 3 * (COLOURS + np.searchsorted(edges, raised.edge[alone]))[:, None] + np.arange(3)
+        found = Entries(row, column, value, (size, again.stage.origin_strain.size))
+        return found.beside(rows[own.ravel()], of_alone)
+
+    def _refuse_on_bodies(self, again: StepAgain) -> None:
+        """Refuse friction on free bodies: its slip depends on their turns, too."""
+        surfaces, sliding, free = again.problem.surfaces, again.problem.sliding, again.problem.bodies.free_index
+        count = sliding.count[0]
+        bodies = surfaces.body[sliding.surface[:count]], surfaces.contact_point_body[sliding.first[:count]]
+        if any((free[of[of >= 0]] >= 0).any() for of in bodies):
+            raise InputError("gradient: a run is not differentiated through friction on a free body")
+
+    def _differences(self, again: StepAgain, colour: Array, edge_colour: Array) -> Differences:
+        """Return arrays for differences by unknowns of these colours."""
+        colours = max(COLOURS, int(colour.max()) + 1)
+        rows = colours * len(self._ways) + (max(COLOURS, int(edge_colour.max()) + 1) if self._turns else 0)
+        bodies = again.of_bodies.size
+        return Differences(
+            colours=colours,
+            ways=self._ways,
+            node_colour=colour,
+            edge_colour=edge_colour,
+            by_place=np.zeros((rows + bodies, again.size)),
+            by_origin=np.zeros((rows, again.size)),
+            by_director=np.zeros((3 * (int(edge_colour.max()) + 1) if self._raised else 0, again.size)),
+            by_law=np.zeros((0, 0)),
+            pressing=self._pressing,
+            following=self._following,
+        )
+
+    def _alone(self, touching) -> Array:
+        """Return nodes near which rods touch."""
+        return self._near(touching.node[: touching.count[0]].ravel(), 1)
+
+    def _near(self, nodes: Array, more: int) -> Array:
+        """Return nodes that see some, or `more` after them."""
+        near = nodes[:, None] + np.arange(-REACH, REACH + 1 + more)
+        return np.intersect1d(near, np.append(self._first, self._first + 1))
+
+    def _entries(self, rows: Array, colours: int, apart: tuple[Array, Array]) -> Entries:
+        """Return differences as a matrix, with columns of nodes and of edges that changed apart from others."""
+        size, ways = rows.shape[1], self._ways
+        of_nodes = rows[: colours * len(ways)].reshape(colours, len(ways), size)
+        of_nodes = (ways.T @ of_nodes).reshape(3 * colours, size)
+        of_edges = rows[colours * len(ways) :]
+        columns = np.concatenate([of_nodes[: 3 * COLOURS], of_edges[:COLOURS]])
+        value = columns[self._from, self._row]
+        if not len(apart[0]):
+            return Entries(self._row, self._column, value, (size, size))
+        value[np.isin(self._column, np.concatenate(apart))] = 0.0
+        found = Entries(self._row, self._column, value, (size, size))
+        return found.beside(of_nodes[3 * COLOURS :], apart[0]).beside(of_edges[COLOURS:], apart[1])
+
+    def momentum(self, again: StepAgain, at: Configuration, velocity: Array) -> tuple[Entries, Entries]:
+        """Return how the fluid's momentum depends on a configuration and on velocities, shapes (size, size)."""
+        fluid, size, nodes = again.problem.fluid, again.size, again.of_nodes
+        fluid.node_velocity[:] = velocity
+        found = self._differences(again, self._colours, self._edge_colours)
+        differentiate_momentum(again.problem, found, at, again.spare, again.stage, 0.1 * FINE * self._shortest)
+        inertia = np.zeros((len(nodes), 3, 3))
+        for end in range(2):
+            for c, director in enumerate((at.director1, at.director2)):
+                m = director[: len(fluid.mass)]
+                halves = 0.5 * fluid.mass[:, c, None, None] * m[:, :, None] * m[:, None, :]
+                np.add.at(inertia, fluid.edge_node + end, halves)
+        row, column = (np.broadcast_to(of, inertia.shape).ravel() for of in (nodes[:, :, None], nodes[:, None, :]))
+        nothing = np.zeros(0, dtype=int), np.zeros(0, dtype=int)
+        by_place = self._entries(found.by_place[: len(found.by_origin)], COLOURS, nothing)
+        return by_place, Entries(row, column, inertia.ravel(), (size, size))
