@@ -154,7 +154,7 @@ def demonstrate(directory: Path) -> None:
         path.unlink(missing_ok=True)
     console.print(
         f"The scene '{SCENE}', simulated by one ROS 2 node; another one ramps its stimulus '{CHANNEL}'.\n"
-        "The first start on a machine compiles all kernels, which takes about a minute.",
+        "The first start on a machine compiles what it needs, which takes one to three minutes.",
         soft_wrap=True,
     )
     start = time.monotonic()

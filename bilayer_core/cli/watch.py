@@ -12,7 +12,7 @@ from types import FrameType
 from bilayer_core.cli.signals import WORDS
 from bilayer_core.cli.terminal import say
 
-COMPILING_NOTICE = "compiling kernels, once for this version on this machine (up to a minute) ..."
+COMPILING_NOTICE = "compiling kernels, once for this version on this machine (one to three minutes) ..."
 TELL_EVERY = 10.0
 """Wall time between two lines about many runs, without a screen [s]."""
 

@@ -62,7 +62,7 @@ def ensure_compiled(
         return
     names = _missing(None if needed is None else needed())
     if names and report is None:
-        _log.warning("compiling kernels, once for this version on this machine: up to a minute")
+        _log.warning("compiling kernels, once for this version on this machine: one to three minutes")
     _compile(names, report)
     if needed is None:
         keep(COMPLETE.format(fingerprint()), b"")
