@@ -53,35 +53,32 @@ def _slope(strands, system, at, e):
 
 
 @kernel
-def most_of_turn(rails, strands, system, at):
-    """Return the largest part of a step over which the bounds of turning hold."""
-    steepest, last = 0.0, -1
-    for i in range(rails.node_edges.shape[0]):
-        if has_arm(rails, i):
-            for side in range(2):
-                e = rails.node_edges[i, side]
-                if e != last:  # which the node before has looked at
-                    steepest, last = max(steepest, _slope(strands, system, at, e)), e
-    return LARGEST_SLOPE / steepest if steepest > LARGEST_SLOPE else 1.0
+def most_of_swing(rails, strands, system, at):
+    """Return the largest part of a step over which the bounds of turning hold, and a bound of all swings in it [m]."""
+    square, turn, step = 0.0, 0.0, system.node_step
+    for e in range(strands.edge_node.shape[0]):
+        n, own = strands.edge_node[e], 0.0
+        if not (has_arm(rails, n) or has_arm(rails, n + 1)):
+            continue
+        for c in range(3):
+            own += (step[n + 1, c] - step[n, c]) ** 2
+        square = max(square, own / (at.length[e] * at.length[e]))
+        turn = max(turn, abs(system.angle_step[e]))
+    slope = math.sqrt(square)
+    part = LARGEST_SLOPE / slope if slope > LARGEST_SLOPE else 1.0
+    return part, rails.longest * (1.3 * slope / (1.0 - part * slope) + turn)
 
 
 @kernel
-def write_swings(rails, strands, system, at, part):
-    """Write the swing of each rail in a part of a step [m]; return the largest."""
-    largest, nodes, last, slope = 0.0, rails.node_edges.shape[0], -1, 0.0
-    for r in range(nodes):
-        turn = 0.0
-        if has_arm(rails, r):
-            for side in range(2):
-                e = rails.node_edges[rails.node[r], side]
-                if e != last:  # whose slope is that at the node before
-                    slope, last = _slope(strands, system, at, e), e
-                turn = max(turn, 1.3 * slope / (1.0 - part * slope) + abs(system.angle_step[e]))
-        rails.swing[r] = math.sqrt(rails.arm[r, 0] ** 2 + rails.arm[r, 1] ** 2) * turn
-        largest = max(largest, rails.swing[r])
-    for r in range(nodes, rails.node.shape[0]):  # right borders are as far from their nodes as left ones
-        rails.swing[r] = rails.swing[rails.node[r]]
-    return largest
+def swing_of(rails, strands, system, at, part, r):
+    """Return the swing of a rail in a part of a step [m]."""
+    turn = 0.0
+    if has_arm(rails, r):
+        for side in range(2):
+            e = rails.node_edges[rails.node[r], side]
+            slope = _slope(strands, system, at, e)
+            turn = max(turn, 1.3 * slope / (1.0 - part * slope) + abs(system.angle_step[e]))
+    return math.sqrt(rails.arm[r, 0] ** 2 + rails.arm[r, 1] ** 2) * turn
 
 
 @kernel

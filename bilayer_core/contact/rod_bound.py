@@ -12,8 +12,8 @@ from __future__ import annotations
 import math
 
 from bilayer_core.contact.facet import BORDERS, SLACK, mix, nearest_on_facet, square_between
-from bilayer_core.contact.rails import rail_in_step
-from bilayer_core.contact.rod_list import FIRST, PATH
+from bilayer_core.contact.rails import rail_in_step, swing_of
+from bilayer_core.contact.rod_list import PATH
 from bilayer_core.contact.step_bound import KEPT_FRACTION
 from bilayer_core.jit import kernel
 from bilayer_core.kinematics.vector import combine, combine3, dot
@@ -45,10 +45,7 @@ def rod_step_bound(rods, strands, system, at, position, limit, closing):
         By how much gaps close in the part of the step up to `limit` at most [m].
     """
     search, d_hat, alpha, step, rails = rods.search, rods.d_hat, limit, system.node_step, rods.rails
-    # Up to this path a pair keeps clear of the barrier in the step, or keeps enough of its gap head-on.
-    looked = rods.ways[PATH] + min(closing, closing / (1.0 - KEPT_FRACTION) - d_hat)
-    if looked < rods.ways[FIRST]:
-        return limit
+    looked = closes_least(rods, closing)
     for c in range(search.count[0]):
         if search.until[c] > looked:
             continue
@@ -63,7 +60,8 @@ def rod_step_bound(rods, strands, system, at, position, limit, closing):
             right += (own - step[j + 1, m]) ** 2
         speed = math.sqrt(max(left, right))
         if rails.exists:
-            speed += _swing(rails, search, a) + _swing(rails, search, k)
+            speed += _swing(rails, strands, system, at, limit, search, a)
+            speed += _swing(rails, strands, system, at, limit, search, k)
         if search.edge_right[a] < 0 and search.edge_right[k] < 0:
             square = _square_distance(position, step, 0.0, i, s, j)
         else:
@@ -91,6 +89,14 @@ def rod_step_bound(rods, strands, system, at, position, limit, closing):
 
 
 @kernel
+def closes_least(rods, closing):
+    """Return the path up to which a pair keeps clear of the barrier, or keeps enough of its gap head-on [m], while gaps
+    close by `closing` at most [m]: pairs with a longer one set no bound.
+    """
+    return rods.ways[PATH] + min(closing, closing / (1.0 - KEPT_FRACTION) - rods.d_hat)
+
+
+@kernel
 def _square_distance(position, step, fraction, i, s, j):
     """Return the square of the distance of the point at s on (i, i+1) from the segment (j, j+1) at x + fraction · step
     [m²].
@@ -110,11 +116,14 @@ def _moved(position, step, fraction, i):
 
 
 @kernel
-def _swing(rails, search, k):
-    """Return the largest swing of a rail of an edge [m]."""
-    j, r, swing = search.edge_node[k], search.edge_right[k], rails.swing
-    largest = max(swing[j], swing[j + 1])
-    return max(largest, swing[r], swing[r + 1]) if r >= 0 else largest
+def _swing(rails, strands, system, at, part, search, k):
+    """Return the largest swing of a rail of an edge in a part of a step [m]."""
+    j, r = search.edge_node[k], search.edge_right[k]
+    largest = max(swing_of(rails, strands, system, at, part, j), swing_of(rails, strands, system, at, part, j + 1))
+    if r < 0:
+        return largest
+    largest = max(largest, swing_of(rails, strands, system, at, part, r))
+    return max(largest, swing_of(rails, strands, system, at, part, r + 1))
 
 
 @kernel

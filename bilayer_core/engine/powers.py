@@ -164,7 +164,7 @@ def _power_of_barriers(p, at, point, rates):
     if rods.exists:
         contacts, v, rails = rods.contacts, point.velocity, rods.rails
         if rails.exists and contacts.count[0] > 0:
-            write_rail_motions(rails, p.strands, rails.rate, point.velocity, point.spin, rails.motion)
+            write_rail_motions(rails, p.strands, rails.meets, rails.rate, point.velocity, point.spin, rails.motion)
             v = rails.motion
         for c in range(contacts.count[0]):
             scale = 0.5 * contacts.multiplicity[c] * rods.stiffness * rods.point_weight[contacts.point[c]]

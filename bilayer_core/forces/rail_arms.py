@@ -41,10 +41,29 @@ def _arm(rails, at, r, e):
 
 
 @kernel
-def write_rail_rates(rails, strands, at, rate_out):
-    """Write the rates of all rails with an arm, shape (n_rail, 3, 8)."""
+def note_rails(rails, contacts, noted_out):
+    """Note the rails that have a part in contacts, and the left ones at their nodes."""
+    noted_out[:] = False
+    for c in range(contacts.count[0]):
+        for side in range(2):
+            for first in (contacts.node[c, side], contacts.right[c, side]):
+                if first >= 0:
+                    for r in range(first, first + 2):
+                        noted_out[r] = noted_out[rails.node[r]] = True
+
+
+@kernel
+def touches(rails, strands, e):
+    """Return whether a rail at a node of an edge has a part in a contact found last."""
+    i = strands.edge_node[e]
+    return rails.meets[i] or rails.meets[i + 1]
+
+
+@kernel
+def write_rail_rates(rails, strands, at, noted, rate_out):
+    """Write the rates of all noted rails with an arm, shape (n_rail, 3, 8)."""
     for r in range(rails.node.shape[0]):
-        if not has_arm(rails, r):
+        if not (noted[r] and has_arm(rails, r)):
             continue
         i = rails.node[r]
         rate_out[r] = 0.0
@@ -94,10 +113,10 @@ def arm_motion(rails, strands, rate, node_vectors, angles, r, c):
 
 
 @kernel
-def write_rail_motions(rails, strands, rate, node_vectors, angles, out):
-    """Write the motions of rails at first order, from those of nodes and the turns of edges."""
+def write_rail_motions(rails, strands, noted, rate, node_vectors, angles, out):
+    """Write the motions of noted rails at first order, from those of nodes and the turns of edges."""
     for r in range(rails.node.shape[0]):
-        for c in range(3):
+        for c in range(3 if noted[r] else 0):
             out[r, c] = node_vectors[rails.node[r], c]
             if has_arm(rails, r):
                 out[r, c] += arm_motion(rails, strands, rate, node_vectors, angles, r, c)
@@ -105,24 +124,27 @@ def write_rail_motions(rails, strands, rate, node_vectors, angles, out):
 
 @kernel
 def write_rail_slips(rails, strands, stage, at):
-    """Write the motions of rails since the origin of a stage with frozen rates [m]."""
+    """Write the motions of rails that rub since the origin of a stage with frozen rates [m]."""
     motion, turn = rails.node_motion, rails.turn
-    for i in range(motion.shape[0]):
-        for c in range(3):
-            motion[i, c] = at.position[i, c] - stage.origin_position[i, c]
-    for e in range(turn.shape[0]):
-        turn[e] = at.total_angle[e] - stage.origin_angle[e]
-    write_rail_motions(rails, strands, rails.slip_rate, motion, turn, rails.slip)
+    for r in range(rails.node.shape[0]):
+        if not rails.rubs[r]:
+            continue
+        for side in range(2):
+            e = rails.node_edges[rails.node[r], side]
+            turn[e] = at.total_angle[e] - stage.origin_angle[e]
+            for i in range(strands.edge_node[e], strands.edge_node[e] + 2):
+                for c in range(3):
+                    motion[i, c] = at.position[i, c] - stage.origin_position[i, c]
+    write_rail_motions(rails, strands, rails.rubs, rails.slip_rate, motion, turn, rails.slip)
 
 
 @kernel
 def write_rail_curvature(rails, strands, at):
-    """Write the second derivatives of arms times `Rails.gradient` by edges, shape (n_edge, 4, 4)."""
+    """Write the second derivatives of arms times `Rails.gradient` by the edges that touch, shape (n_edge, 4, 4)."""
     out = rails.curvature
     for e in range(out.shape[0]):
-        for m in range(4):
-            for n in range(4):
-                out[e, m, n] = 0.0
+        if touches(rails, strands, e):
+            out[e] = 0.0
     for r in range(rails.node.shape[0]):
         i, g = rails.node[r], row(rails.gradient, r)
         if not has_arm(rails, r) or (g[0] == 0.0 and g[1] == 0.0 and g[2] == 0.0):

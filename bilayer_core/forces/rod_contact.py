@@ -57,8 +57,8 @@ import math
 from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hessian
 from bilayer_core.contact.broad_phase import near_pairs
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
-from bilayer_core.contact.rails import most_of_turn, place_rails, write_rail_steps, write_swings
-from bilayer_core.contact.rod_bound import rod_step_bound
+from bilayer_core.contact.rails import most_of_swing, place_rails, write_rail_steps
+from bilayer_core.contact.rod_bound import closes_least, rod_step_bound
 from bilayer_core.contact.rod_list import (
     FIRST,
     LEFT,
@@ -72,6 +72,7 @@ from bilayer_core.contact.rod_list import (
 from bilayer_core.contact.segment import facing_contacts
 from bilayer_core.forces.rail_arms import (
     hand_on,
+    note_rails,
     write_rail_curvature,
     write_rail_motions,
     write_rail_rates,
@@ -117,7 +118,12 @@ def find_rod_contacts(p, at):
     if rods.ways[PATH] >= rods.ways[FIRST]:
         found[0], gap, rods.ways[FIRST] = facing_contacts(rods, place, rods.ways[PATH])
     rods.gap[0] = gap
-    return found[0] <= rods.contacts.point.shape[0]
+    if found[0] > rods.contacts.point.shape[0]:
+        return False
+    if rods.rails.exists and found[0] > 0:
+        note_rails(rods.rails, rods.contacts, rods.rails.meets)
+        write_rail_rates(rods.rails, p.strands, at, rods.rails.meets, rods.rails.rate)
+    return True
 
 
 @piece(float, Problem, Configuration)
@@ -128,13 +134,15 @@ def bound_between_rods(p, at):
     rails, place = rods.rails, at.position
     move, limit, swing, stray = largest_motion(step), 1.0, 0.0, 0.0
     if rails.exists:
-        place_rails(rails, at)
-        place = rails.place
-        limit = most_of_turn(rails, p.strands, p.system, at)
-        swing = write_swings(rails, p.strands, p.system, at, limit)
+        limit, swing = most_of_swing(rails, p.strands, p.system, at)
         move += 2.0 * swing  # the mean of all taken off
     limit = reachable(move, limit, rods.unit)
     serves = limit * move <= rods.ways[LEFT]  # whatever the ways
+    if serves and closes_least(rods, 2.0 * limit * move) < rods.ways[FIRST]:
+        return limit
+    if rails.exists:
+        place_rails(rails, at)
+        place = rails.place
     if rails.exists and not serves:
         write_rail_steps(rails, p.strands, p.system, at, limit)
         step, stray = rails.step, 0.5 * limit * swing
@@ -187,7 +195,8 @@ def _freeze_at(rods, strands, at):
     """Freeze contacts, and the rates of rails, for friction."""
     _freeze(rods, at)
     if rods.rails.exists and rods.sliding.count[0] > 0:
-        write_rail_rates(rods.rails, strands, at, rods.rails.slip_rate)
+        note_rails(rods.rails, rods.sliding, rods.rails.rubs)
+        write_rail_rates(rods.rails, strands, at, rods.rails.rubs, rods.rails.slip_rate)
 
 
 @piece(int, RodContact, Problem, Configuration, Stage)
@@ -216,7 +225,6 @@ def add_rod_barrier(rods, p, at, stage, with_hessian):
         else:
             rails.gradient[:] = 0.0
             sums.energy[ROD_BARRIER] = _add_barrier(rods, rails.place, rails.gradient)
-            write_rail_rates(rails, p.strands, at, rails.rate)
             hand_on(rails, p.strands, rails.gradient, rails.rate, sums.contact_point, sums.edge)
             if with_hessian:
                 write_rail_curvature(rails, p.strands, at)
@@ -477,7 +485,8 @@ def rod_slip_along(rods, strands, stage, at, system, begin, path_out):
     position, origin, node_step, still = at.position, stage.origin_position, step, (0.0, 0.0, 0.0)
     if rails.exists and contacts.count[0] > 0:
         write_rail_slips(rails, strands, stage, at)
-        write_rail_motions(rails, strands, rails.slip_rate, system.node_step, system.angle_step, rails.motion)
+        turned = system.angle_step
+        write_rail_motions(rails, strands, rails.rubs, rails.slip_rate, system.node_step, turned, rails.motion)
         position, origin, node_step = rails.slip, rods.no_step, rails.motion
     normal = contacts.normal
     slip, rate = stack_vector(3), stack_vector(3)

@@ -26,6 +26,7 @@ from bilayer_core.contact.rails import has_arm
 from bilayer_core.engine.linear.assembly import hold_unknowns
 from bilayer_core.engine.linear.attachments import arm_jacobian
 from bilayer_core.engine.linear.new_columns import add_columns, add_to_column
+from bilayer_core.forces.rail_arms import touches
 from bilayer_core.jit import kernel, piece
 from bilayer_core.jit.called import stack_matrix, stack_vector
 from bilayer_core.model.records.problem import Problem
@@ -285,7 +286,7 @@ def _add_curvature(rails, strands, band):
     axes, dimension, block = strands.axes, strands.axes.shape[0], rails.curvature
     for e in range(block.shape[0]):
         i = strands.edge_node[e]
-        if rails.right[e] < 0 and not has_arm(rails, i) and not has_arm(rails, i + 1):
+        if not touches(rails, strands, e):
             continue
         first, last = strands.row[i], strands.row[i + 1]
         for x in range(dimension):

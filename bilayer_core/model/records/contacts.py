@@ -181,16 +181,18 @@ class Rails:
     node_edges: IndexTable  # before and after each node, the same at an end, shape (n_node, 2)
     factor: float  # how many times farther than nodes, and borders of edges by a turn, rails move at most
     place: Matrix = ("rail", 3)  # [m]
-    rate: Stack = ("rail", 3, 8)  # by the edges at each node, see `forces.rail_arms`
+    longest: float  # arm [m]
+    meets: Flags = ("rail",)  # whether it has a part in a contact found last
+    rate: Stack = ("rail", 3, 8)  # of these by the edges at each node, see `forces.rail_arms`
     gradient: Matrix = ("rail", 3)  # of the barrier at the contacts found last [N]
-    curvature: Stack = ("edge", 4, 4)  # what its second derivative has of arms
+    curvature: Stack = ("edge", 4, 4)  # what its second derivative has of arms of these
+    rubs: Flags = ("rail",)  # whether it has a part in a contact frozen for friction
     slip_rate: Stack = ("rail", 3, 8)  # rates frozen for friction
     drag: Matrix = ("rail", 3)  # gradient of friction [N]
     slip: Matrix = ("rail", 3)  # since the origin of a stage [m]
     node_motion: Matrix = ("node", 3)  # scratch
     motion: Matrix = ("rail", 3)  # scratch
     turn: Vector = ("edge",)  # scratch
-    swing: Vector = ("rail",)  # in a step beyond the motion of their nodes, at most [m]
     step: Matrix = ("rail", 3)  # mean motion in a step [m]
 
 
