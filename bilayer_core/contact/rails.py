@@ -29,12 +29,14 @@ LARGEST_SLOPE = 0.5
 @kernel
 def place_rails(rails, at):
     """Write the positions of rails [m], shape (n_node, 3)."""
-    place, edges, m1, m2 = rails.place, rails.node_edges, at.director1, at.director2
+    place, m1, m2 = rails.place, at.director1, at.director2
     for r in range(place.shape[0]):
         i, up, aside = rails.node[r], 0.5 * rails.arm[r, 0], 0.5 * rails.arm[r, 1]
+        before, after = rails.node_edges[i, 0], rails.node_edges[i, 1]
         for c in range(3):
-            place[r, c] = at.position[i, c] + up * (m1[edges[i, 0], c] + m1[edges[i, 1], c])
-            place[r, c] += aside * (m2[edges[i, 0], c] + m2[edges[i, 1], c])
+            place[r, c] = at.position[i, c] + up * (m1[before, c] + m1[after, c])
+        for c in range(3 if aside != 0.0 else 0):
+            place[r, c] += aside * (m2[before, c] + m2[after, c])
 
 
 @kernel

@@ -111,12 +111,23 @@ def _motion_of_rod_points(surfaces, strands, system, at):
     """
     if not surfaces.rod_points.exists:
         return 0.0
-    steepest = sharpest = speed = 0.0
+    step, held = system.node_step, surfaces.moved_by
+    steepest = sharpest = speed = of_free_edges = of_free_nodes = 0.0
     for e in range(strands.edge_node.shape[0]):
-        slope, angle, _ = _turn_of_edge(surfaces, strands, system, at, e)
-        steepest, sharpest = max(steepest, slope), max(sharpest, angle)
+        n, square = strands.edge_node[e], 0.0
+        sharpest = max(sharpest, abs(system.angle_step[e]))
+        if held[n] >= 0 or held[n + 1] >= 0:
+            steepest = max(steepest, _turn_of_edge(surfaces, strands, system, at, e)[0])
+            continue
+        for c in range(3):
+            square += (step[n + 1, c] - step[n, c]) ** 2
+        of_free_edges = max(of_free_edges, square / (at.length[e] * at.length[e]))
     for i in range(surfaces.node_free.shape[0]):
-        speed = max(speed, _speed_of_node(surfaces, system, at, i))
+        if held[i] >= 0:
+            speed = max(speed, _speed_of_node(surfaces, system, at, i))
+        else:
+            of_free_nodes = max(of_free_nodes, step[i, 0] ** 2 + step[i, 1] ** 2 + step[i, 2] ** 2)
+    steepest, speed = max(steepest, math.sqrt(of_free_edges)), max(speed, math.sqrt(of_free_nodes))
     turn = (0.5 * math.pi if steepest <= 1.0 else math.pi) * steepest + sharpest
     return surfaces.rod_points.node_factor * speed + surfaces.rod_points.longest * turn
 
