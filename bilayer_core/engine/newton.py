@@ -46,7 +46,7 @@ ARMIJO = 1e-4  # least fraction of the predicted decrease (Nocedal and Wright 20
 KEEP_FACTOR_BELOW = 0.2  # ratio of successive corrections
 BACKTRACKING = 0.5
 MAX_BACKTRACKS = 30
-SAFE_PART = 0.5  # of the smallest gap, which a last correction may close without a look at each pair
+SAFE_PART = 0.5  # of the smallest gap, which a correction may close without a look at each pair
 MAX_SETTLINGS = 8
 SETTLED_WITHIN = 10.0  # times the tolerance: the first correction after forces were settled, which then is the last one
 ROUNDING = 1e-13  # of the sum of the terms' magnitudes: differences of the potential below it mean nothing
@@ -110,7 +110,7 @@ def bound(p, at):
     """Return the largest fraction of `System.node_step`, `System.angle_step` and `System.motion` that keeps all gaps
     open; the near pair that sets it (−1: none), and whether that could be found, are left in `Outcome`.
     """
-    _move_constrained(p.constrained, p.system, at)
+    move_constrained(p.constrained, p.system, at)
     outcome = p.outcome
     outcome.pair, outcome.status = -1, READY
     fraction = 1.0
@@ -126,7 +126,7 @@ def bound(p, at):
 
 
 @kernel
-def _move_constrained(constrained, system, at):
+def move_constrained(constrained, system, at):
     """Write the displacements of nodes that bodies hold."""
     for k in range(constrained.node.shape[0]):
         i, b = constrained.node[k], constrained.body[k]
@@ -341,16 +341,20 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
         if not settled and not fresh and residual > KEEP_FACTOR_BELOW * previous:
             task = FACTORISE
             continue
-        farthest = residual * stage.length * (p.surfaces.arm_factor if p.surfaces.exists else 1.0)
-        if settled and 2.0 * farthest <= SAFE_PART * min(gap, _least_gap_of_rods(p.rod_contact)):
-            alpha, halvings, task = 1.0, 0, SEARCH  # two points that move towards each other keep a gap
+        open_gap = min(gap, p.rod_contact.d_hat) if p.rod_contact.exists else gap  # of rods that is the most it is
+        safe = 2.0 * residual * stage.length * _reach(p) <= SAFE_PART * open_gap  # two points may near each other
+        alpha, halvings, task = 1.0, 0, SEARCH
+        if settled and safe:
             continue
         slope, noise = predicted_decrease(p.strands, p.bodies, p.sums, p.system)
-        alpha = bound(p, at)
-        status = outcome.status
-        if status != READY:
-            break
-        halvings, task = 0, SEARCH
+        if safe:
+            outcome.pair = -1
+            move_constrained(p.constrained, p.system, at)
+        else:
+            alpha = bound(p, at)
+            status = outcome.status
+            if status != READY:
+                break
         if fresh and not settled and p.slips.exists:
             alpha = limit_by_friction(p, at, stage, slope, alpha)
         short = alpha < 1.0
@@ -360,13 +364,10 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
 
 
 @kernel
-def _least_gap_of_rods(rods):
-    """Return the gap above which contacts of rods are not counted, in motions of nodes [m]; infinite where rods cannot
-    meet.
-    """
-    if not rods.exists:
-        return math.inf
-    return rods.d_hat / rods.rails.factor if rods.rails.exists else rods.d_hat
+def _reach(p):
+    """Return how many times farther than nodes and borders of edges a point that meets others moves at most."""
+    reach = p.surfaces.arm_factor if p.surfaces.exists else 1.0
+    return max(reach, p.rod_contact.rails.factor) if p.rod_contact.exists and p.rod_contact.rails.exists else reach
 
 
 @kernel
