@@ -342,14 +342,17 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
             task = FACTORISE
             continue
         open_gap = min(gap, p.rod_contact.d_hat) if p.rod_contact.exists else gap  # of rods that is the most it is
-        safe = 2.0 * residual * stage.length * _reach(p) <= SAFE_PART * open_gap  # two points may near each other
+        nearer = 2.0 * residual * stage.length * _reach(p)  # by so much two points may near each other
+        safe = nearer <= SAFE_PART * open_gap
         alpha, halvings, task = 1.0, 0, SEARCH
         if settled and safe:
             continue
         slope, noise = predicted_decrease(p.strands, p.bodies, p.sums, p.system)
-        if safe:
+        if safe and (not p.surfaces.exists or nearer <= p.surfaces.room[0]):
             outcome.pair = -1
             move_constrained(p.constrained, p.system, at)
+            if p.surfaces.exists:
+                p.surfaces.room[0] -= nearer
         else:
             alpha = bound(p, at)
             status = outcome.status

@@ -142,7 +142,7 @@ class Storage:
     def _surfaces(self, sizes: dict[str, int]) -> Surfaces:
         """Return the points and surfaces, without a list of those that are near each other yet."""
         stiffness = self._model.contact_stiffness
-        return self._model.surfaces.allocated(sizes, stiffness=stiffness, margin=np.full(1, -1.0))
+        return self._model.surfaces.allocated(sizes, stiffness=stiffness, margin=np.full(1, -1.0), room=np.zeros(1))
 
     def _sliding(self, before: Problem | None, sizes: dict[str, int]) -> Sliding:
         scene, of_model = self._model.scene, self._model.sliding

@@ -27,15 +27,17 @@ def list_surface_pairs(surfaces, at, motion):
     if surfaces.dense:  # a wide list holds very many points
         margin = min(margin, motion + MOTION_MARGIN * surfaces.d_hat)
     wide = surfaces.dense and surfaces.margin[0] > MOTION_MARGIN * (motion + MOTION_MARGIN * surfaces.d_hat)
-    if not wide and moved_since(surfaces, at) + motion <= surfaces.margin[0]:
-        return READY
+    if not wide:
+        surfaces.room[0] = surfaces.margin[0] - moved_since(surfaces, at) - motion
+        if surfaces.room[0] >= 0.0:
+            return READY
     count = list_near(surfaces, at, margin)
     if count > surfaces.near_contact_point.shape[0]:
         surfaces.margin[0] = -1.0
         surfaces.near_count[0] = 0
         return PAIR_CAPACITY_EXCEEDED
     surfaces.near_count[0] = count
-    surfaces.margin[0] = margin
+    surfaces.margin[0], surfaces.room[0] = margin, margin - motion
     return READY
 
 

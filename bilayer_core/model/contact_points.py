@@ -150,6 +150,7 @@ def build_contact(
         can_collide=np.ascontiguousarray(groups.T),
         edge_can_cross=_of_edges(found, of_nodes[:, used]) & ~flat[:, None],
         margin=np.zeros(1),
+        room=np.zeros(1),
     )
     surface_grain = np.array([s.grain for s in surfaces]).reshape(-1, 3)
     point_grain = np.zeros((len(point_body), 3))

@@ -72,6 +72,9 @@ class Surfaces:
     near_length: Vector = ("near",)  # of the stretch of a rod before a flat face that it stands for, 0 elsewhere [m]
     near_count: Indices = (1,)
     margin: Vector  # shape (1,)
+    room: (
+        Vector  # by how much points and surfaces may still near each other before the list is looked at, shape (1,) [m]
+    )
     extent: Vector = ("surface",)
     listed_contact_point: Matrix = ("contact_point", 3)
     listed_director1: Matrix = ("edge", 3)
