@@ -143,6 +143,8 @@ def test_shapes_on_the_way_to_a_helix_go_from_the_start_to_the_target():
     [
         ([[0, 0, 0], [1, 0, 0], [2, 0, 0]], "must be 4 points or more"),
         ([[0, 0, 0], [1, 0, 0], [1, 0, 0], [2, 0, 0]], "point 3 is that before it"),
+        ([[0, 0, 0], [1, 0, 0], [2, math.nan, 0], [3, 0, 0]], "point 3 is 2, nan, 0; must be finite"),
+        ([[0, 0, 0], [1e200, 0, 0], [2e200, 0, 0], [3e200, 0, 0]], r"point 2 is 1e\+200, 0, 0; .* at most 1e\+06"),
         ([[0, 0, 0], [1, 0, 0], [1, 0, 1], [1, 0, 2]], "has a kink at point 2 .* where it turns by 90°"),
     ],
 )
@@ -163,7 +165,13 @@ def straight(length, direction=(1.0, 0.0, 0.0)):
         (straight(0.1), {"rods.strip.width": (1e-3, 2e-3)}, "vary rods.strip.width: acts on nothing"),
         (straight(0.1), {}, "vary: nothing is given"),
         (straight(0.1), {GAIN: (0.1, -0.1)}, "the lower bound 0.1 must be below the upper one"),
-        (straight(0.1), {GAIN: (-0.1, 0.1, 1)}, "1 points are not allowed; it must be a whole number from 2 up"),
+        (straight(0.1), {GAIN: (-0.1, 0.1, 1)}, "1 points are not allowed; it must be a whole number from 2 to 500"),
+        (straight(0.1), [f"{GAIN}=1%,2%:5000"], "5000 points are not allowed"),
+        (
+            straight(0.1),
+            [f"{GAIN}=0:1%:5", f"{GAIN}=0:2%:5"],
+            "vary rods.strip.layers.active.eigenstrain.gain: is given twice",
+        ),
         (straight(0.1), [f"{GAIN}=1%,1%:9"], "a palette must have two values or more"),
         (straight(0.1), [f"{GAIN}=1%,thick:9"], "gain: .*thick"),
         (straight(0.1), [f"{GAIN}=1%,2%:9:3"], "must be PATH=LO:HI, .* or PATH=V,V,…:PIECES"),
@@ -175,6 +183,22 @@ def straight(length, direction=(1.0, 0.0, 0.0)):
 def test_bad_input_of_a_design_is_refused(target, vary, message):
     with pytest.raises((InputError, SceneError), match=message):
         design("bending", target, vary)
+
+
+@pytest.mark.parametrize("smoothness", [math.nan, math.inf, -1.0])
+def test_a_smoothness_that_is_no_weight_is_refused(smoothness):
+    with pytest.raises(InputError, match="smoothness: .* must be a finite number from 0 up"):
+        design("bending", straight(0.1), {GAIN: (-0.1, 0.1)}, smoothness=smoothness)
+
+
+def test_two_shapes_at_the_same_stimuli_are_refused():
+    with pytest.raises(InputError, match="two curves are wanted at the same stimuli"):
+        design("bending", [straight(0.1)] * 2, {GAIN: (-0.1, 0.1)}, at=[{"swelling": 1.0}] * 2)
+
+
+def test_blanks_after_commas_of_a_curve_are_no_part_of_its_columns(tmp_path):
+    (tmp_path / "curve.csv").write_text("x, y, z\n0, 0, 0\n1, 0, 0\n2, 0, 0\n3, 0, 0\n")
+    assert read_curve(tmp_path / "curve.csv").length == pytest.approx(3.0)
 
 
 def test_the_command_writes_scene_pattern_report_and_picture(tmp_path, capsys):
@@ -197,7 +221,12 @@ def test_the_command_writes_scene_pattern_report_and_picture(tmp_path, capsys):
 
 @pytest.mark.parametrize(
     ("text", "message"),
-    [("a,b\n1,2\n", "must have columns x, y and z"), ("x,y,z\n1,2,\n", "line 2: must have three numbers")],
+    [
+        ("a,b\n1,2\n", "must have columns x, y and z"),
+        ("x,y,z,x\n1,2,3,4\n", "each once; its first line has: .*'z', 'x'"),
+        ("x,y,z\n", "must be 4 points or more"),
+        ("x,y,z\n1,2,\n", "line 2: must have three numbers"),
+    ],
 )
 def test_a_file_that_holds_no_curve_is_refused(tmp_path, text, message):
     (tmp_path / "curve.csv").write_text(text)

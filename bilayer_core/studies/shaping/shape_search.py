@@ -108,6 +108,11 @@ def design(
         levels = [{name: channel.maximum for name, channel in config.stimuli.items()}]
     if len(levels) != len(curves):
         raise InputError(f"target: {len(curves)} curves need values of stimuli each, {len(levels)} are given")
+    for level in levels:
+        if levels.count(level) > 1:
+            raise InputError(f"target: two curves are wanted at the same stimuli, {level}")
+    if not 0.0 <= smoothness < math.inf:
+        raise InputError(f"smoothness: {smoothness} is not allowed; it must be a finite number from 0 up")
     config, varied = read_varied(config, vary)
     return _Search(config, varied, curves, levels, smoothness, progress).result()
 

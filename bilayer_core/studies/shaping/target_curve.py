@@ -20,6 +20,8 @@ SHARPEST = math.radians(45.0)
 """Turn from a piece of a curve to the next that is no kink."""
 SAMPLES = 16
 """Of each piece, for its arc length."""
+FARTHEST = 1e6
+"""Coordinate of a curve [m]."""
 CORRECTIONS = 8
 """Of the nearest point by Newton's method."""
 
@@ -49,8 +51,15 @@ class TargetCurve:
 
     def __init__(self, points: Array, source: str = "target"):
         points = np.array(points, dtype=float)
-        if points.ndim != 2 or points.shape[1] != 3 or len(points) < FEWEST or not np.isfinite(points).all():
+        if points.ndim != 2 or points.shape[1] != 3 or len(points) < FEWEST:
             raise InputError(f"{source}: must be {FEWEST} points or more of x, y and z, has shape {points.shape}")
+        allowed = (np.abs(points) <= FARTHEST).all(axis=1)
+        if not allowed.all():
+            k = int(np.argmin(allowed))
+            raise InputError(
+                f"{source}: point {k + 1} is {', '.join(f'{x:g}' for x in points[k])}; must be finite, "
+                f"at most {FARTHEST:g} m"
+            )
         pieces = np.diff(points, axis=0)
         lengths = np.linalg.norm(pieces, axis=1)
         if not lengths.all():
@@ -142,12 +151,13 @@ def read_curve(path: str | Path) -> TargetCurve:
     """
     source = str(path)
     try:
-        rows = list(csv.DictReader(io.StringIO(read_text(Path(path), LARGEST_TABLE), newline=""), strict=True))
+        text = io.StringIO(read_text(Path(path), LARGEST_TABLE), newline="")
+        table = csv.DictReader(text, strict=True, skipinitialspace=True)
+        columns, rows = list(table.fieldnames or ()), list(table)
     except (csv.Error, ValueError) as error:
         raise InputError(f"{source}: must be a readable csv file: {error}") from None
-    columns = list(rows[0]) if rows else []
-    if not {"x", "y", "z"} <= set(columns):
-        raise InputError(f"{source}: must have columns x, y and z [m]; its first line has: {', '.join(columns)}")
+    if any(columns.count(axis) != 1 for axis in "xyz"):
+        raise InputError(f"{source}: must have columns x, y and z [m], each once; its first line has: {columns}")
     points = []
     for line, row in enumerate(rows, start=2):
         try:

@@ -22,6 +22,8 @@ FORM = (
     "must be PATH=LO:HI, PATH=LO:HI:POINTS, PATH=V,V,… or PATH=V,V,…:PIECES, such as "
     "rods.strip.layers.active.eigenstrain.gain=-2%:2%:40"
 )
+MOST = 500
+"""Points or pieces of a profile: equations are solved in a time that goes as the cube of their number."""
 BETWEEN = 1e-3
 """From the end of a piece to the start of the next, of their length."""
 
@@ -99,8 +101,10 @@ def read_varied(scene: SceneConfig, asked: Vary) -> tuple[SceneConfig, list[Vari
     given = _given(asked)
     if not given:
         raise InputError(f"vary: nothing is given; each {FORM}")
-    found = []
+    found: list[Varied] = []
     for path, ends, points in given:
+        if path in [v.path for v in found]:
+            raise InputError(f"vary {path}: is given twice")
         content = scene_content(scene)
         try:
             holder, place = read_overrides({path: 0.0})[0].find(content)
@@ -147,8 +151,8 @@ def _places(scene: SceneConfig, path: str, points: Any, palette: Sequence[float]
         count = int(str(points))
     except ValueError:
         count = 0
-    if count < 2:
-        raise InputError(f"vary {path}: {points} points are not allowed; it must be a whole number from 2 up")
+    if not 2 <= count <= MOST:
+        raise InputError(f"vary {path}: {points} points are not allowed; it must be a whole number from 2 to {MOST}")
     keys = path.split(".")
     rods = {key: rod for k, rod in enumerate(scene.rods) for key in (rod.name, str(k))}
     if keys[0] != "rods" or keys[1] not in rods:
