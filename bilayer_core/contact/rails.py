@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import math
 
+from bilayer_core.contact.step_bound import square_of_change
 from bilayer_core.jit import kernel
 from bilayer_core.kinematics.vector import combine, cross, dot, row
 
@@ -46,29 +47,25 @@ def has_arm(rails, r):
 
 
 @kernel
-def _slope(strands, system, at, e):
-    """Return σ of an edge."""
-    n, step, square = strands.edge_node[e], system.node_step, 0.0
-    for c in range(3):
-        square += (step[n + 1, c] - step[n, c]) ** 2
-    return math.sqrt(square) / at.length[e]
+def _square_of_arm(rails, r):
+    """Return |A|² of a rail [m²]."""
+    return rails.arm[r, 0] ** 2 + rails.arm[r, 1] ** 2
 
 
 @kernel
 def most_of_swing(rails, strands, system, at):
     """Return the largest part of a step over which the bounds of turning hold, and a bound of all swings in it [m]."""
-    square, turn, step = 0.0, 0.0, system.node_step
+    steepest = slope = turn = 0.0  # squares; the last two times that of an arm
     for e in range(strands.edge_node.shape[0]):
-        n, own = strands.edge_node[e], 0.0
-        if not (has_arm(rails, n) or has_arm(rails, n + 1)):
-            continue
-        for c in range(3):
-            own += (step[n + 1, c] - step[n, c]) ** 2
-        square = max(square, own / (at.length[e] * at.length[e]))
-        turn = max(turn, abs(system.angle_step[e]))
-    slope = math.sqrt(square)
-    part = LARGEST_SLOPE / slope if slope > LARGEST_SLOPE else 1.0
-    return part, rails.longest * (1.3 * slope / (1.0 - part * slope) + turn)
+        n = strands.edge_node[e]
+        arm = max(_square_of_arm(rails, n), _square_of_arm(rails, n + 1))
+        if arm > 0.0:
+            own = square_of_change(strands, system, e) / (at.length[e] * at.length[e])
+            steepest, slope = max(steepest, own), max(slope, arm * own)
+            turn = max(turn, arm * system.angle_step[e] ** 2)
+    steepest = math.sqrt(steepest)
+    part = LARGEST_SLOPE / steepest if steepest > LARGEST_SLOPE else 1.0
+    return part, 1.3 * math.sqrt(slope) / (1.0 - part * steepest) + math.sqrt(turn)
 
 
 @kernel
@@ -78,9 +75,9 @@ def swing_of(rails, strands, system, at, part, r):
     if has_arm(rails, r):
         for side in range(2):
             e = rails.node_edges[rails.node[r], side]
-            slope = _slope(strands, system, at, e)
+            slope = math.sqrt(square_of_change(strands, system, e)) / at.length[e]
             turn = max(turn, 1.3 * slope / (1.0 - part * slope) + abs(system.angle_step[e]))
-    return math.sqrt(rails.arm[r, 0] ** 2 + rails.arm[r, 1] ** 2) * turn
+    return math.sqrt(_square_of_arm(rails, r)) * turn
 
 
 @kernel

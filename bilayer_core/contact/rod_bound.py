@@ -45,7 +45,7 @@ def rod_step_bound(rods, strands, system, at, position, limit, closing):
         By how much gaps close in the part of the step up to `limit` at most [m].
     """
     search, d_hat, alpha, step, rails = rods.search, rods.d_hat, limit, system.node_step, rods.rails
-    looked = closes_least(rods, closing)
+    looked = path_to_look_at(rods, closing)
     for c in range(search.count[0]):
         if search.until[c] > looked:
             continue
@@ -89,7 +89,7 @@ def rod_step_bound(rods, strands, system, at, position, limit, closing):
 
 
 @kernel
-def closes_least(rods, closing):
+def path_to_look_at(rods, closing):
     """Return the path up to which a pair keeps clear of the barrier, or keeps enough of its gap head-on [m], while gaps
     close by `closing` at most [m]: pairs with a longer one set no bound.
     """

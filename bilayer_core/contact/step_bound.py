@@ -85,13 +85,20 @@ def _speed_of_node(surfaces, system, at, i):
 
 
 @kernel
-def _turn_of_edge(surfaces, strands, system, at, e):
-    """Return the bounds of |ė|/l, |θ̇| and |ë|/l of an edge during a step."""
+def square_of_change(strands, system, e):
+    """Return the square of the change of an edge vector in a step, |δe|² [m²]."""
     n, step, square = strands.edge_node[e], system.node_step, 0.0
     for c in range(3):
         square += (step[n + 1, c] - step[n, c]) ** 2
+    return square
+
+
+@kernel
+def _turn_of_edge(surfaces, strands, system, at, e):
+    """Return the bounds of |ė|/l, |θ̇| and |ë|/l of an edge during a step."""
+    n, size = strands.edge_node[e], math.sqrt(square_of_change(strands, system, e))
     change = _acceleration_of_node(surfaces, system, at, n) + _acceleration_of_node(surfaces, system, at, n + 1)
-    return (math.sqrt(square) + change) / at.length[e], abs(system.angle_step[e]), change / at.length[e]
+    return (size + change) / at.length[e], abs(system.angle_step[e]), change / at.length[e]
 
 
 @kernel
@@ -114,14 +121,12 @@ def _motion_of_rod_points(surfaces, strands, system, at):
     step, held = system.node_step, surfaces.moved_by
     steepest = sharpest = speed = of_free_edges = of_free_nodes = 0.0
     for e in range(strands.edge_node.shape[0]):
-        n, square = strands.edge_node[e], 0.0
+        n = strands.edge_node[e]
         sharpest = max(sharpest, abs(system.angle_step[e]))
         if held[n] >= 0 or held[n + 1] >= 0:
             steepest = max(steepest, _turn_of_edge(surfaces, strands, system, at, e)[0])
-            continue
-        for c in range(3):
-            square += (step[n + 1, c] - step[n, c]) ** 2
-        of_free_edges = max(of_free_edges, square / (at.length[e] * at.length[e]))
+        else:
+            of_free_edges = max(of_free_edges, square_of_change(strands, system, e) / (at.length[e] * at.length[e]))
     for i in range(surfaces.node_free.shape[0]):
         if held[i] >= 0:
             speed = max(speed, _speed_of_node(surfaces, system, at, i))

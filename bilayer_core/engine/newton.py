@@ -110,7 +110,7 @@ def bound(p, at):
     """Return the largest fraction of `System.node_step`, `System.angle_step` and `System.motion` that keeps all gaps
     open; the near pair that sets it (−1: none), and whether that could be found, are left in `Outcome`.
     """
-    move_constrained(p.constrained, p.system, at)
+    _move_constrained(p.constrained, p.system, at)
     outcome = p.outcome
     outcome.pair, outcome.status = -1, READY
     fraction = 1.0
@@ -126,7 +126,7 @@ def bound(p, at):
 
 
 @kernel
-def move_constrained(constrained, system, at):
+def _move_constrained(constrained, system, at):
     """Write the displacements of nodes that bodies hold."""
     for k in range(constrained.node.shape[0]):
         i, b = constrained.node[k], constrained.body[k]
@@ -350,7 +350,7 @@ def minimise_potential(p, at, trial, stage, tolerance, max_iterations, wanted):
         slope, noise = predicted_decrease(p.strands, p.bodies, p.sums, p.system)
         if safe and (not p.surfaces.exists or nearer <= p.surfaces.room[0]):
             outcome.pair = -1
-            move_constrained(p.constrained, p.system, at)
+            _move_constrained(p.constrained, p.system, at)
             if p.surfaces.exists:
                 p.surfaces.room[0] -= nearer
         else:

@@ -58,7 +58,7 @@ from bilayer_core.contact.barrier import barrier, barrier_gradient, barrier_hess
 from bilayer_core.contact.broad_phase import near_pairs
 from bilayer_core.contact.friction_law import friction_over_speed, friction_potential, friction_slope
 from bilayer_core.contact.rails import most_of_swing, place_rails, write_rail_steps
-from bilayer_core.contact.rod_bound import closes_least, rod_step_bound
+from bilayer_core.contact.rod_bound import path_to_look_at, rod_step_bound
 from bilayer_core.contact.rod_list import (
     FIRST,
     LEFT,
@@ -138,7 +138,7 @@ def bound_between_rods(p, at):
         move += 2.0 * swing  # the mean of all taken off
     limit = reachable(move, limit, rods.unit)
     serves = limit * move <= rods.ways[LEFT]  # whatever the ways
-    if serves and closes_least(rods, 2.0 * limit * move) < rods.ways[FIRST]:
+    if serves and path_to_look_at(rods, 2.0 * limit * move) < rods.ways[FIRST]:
         return limit
     if rails.exists:
         place_rails(rails, at)

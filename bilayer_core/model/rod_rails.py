@@ -51,8 +51,7 @@ def build_rails(found: Collected, ribbons: set[str]) -> Rails:
     slope = size / found.column("rest_length")[edges[node]].min(axis=1)
     turn = size / found.column("half_width")[edges[node]].min(axis=1)
     factor = float(np.max(1.0 + 4.0 * slope + turn))  # half of the lengths is left at least
-    longest = float(size.max())
-    return Rails.zeros(UNALLOCATED, node=node, arm=arm, right=right, node_edges=edges, factor=factor, longest=longest)
+    return Rails.zeros(UNALLOCATED, node=node, arm=arm, right=right, node_edges=edges, factor=factor)
 
 
 def start_rails(found: Collected, rails: Rails) -> Array:

@@ -72,9 +72,7 @@ class Surfaces:
     near_length: Vector = ("near",)  # of the stretch of a rod before a flat face that it stands for, 0 elsewhere [m]
     near_count: Indices = (1,)
     margin: Vector  # shape (1,)
-    room: (
-        Vector  # by how much points and surfaces may still near each other before the list is looked at, shape (1,) [m]
-    )
+    room: Vector  # by how much points and surfaces may near each other before the list is checked, shape (1,) [m]
     extent: Vector = ("surface",)
     listed_contact_point: Matrix = ("contact_point", 3)
     listed_director1: Matrix = ("edge", 3)
@@ -184,7 +182,6 @@ class Rails:
     node_edges: IndexTable  # before and after each node, the same at an end, shape (n_node, 2)
     factor: float  # how many times farther than nodes, and borders of edges by a turn, rails move at most
     place: Matrix = ("rail", 3)  # [m]
-    longest: float  # arm [m]
     meets: Flags = ("rail",)  # whether it has a part in a contact found last
     rate: Stack = ("rail", 3, 8)  # of these by the edges at each node, see `forces.rail_arms`
     gradient: Matrix = ("rail", 3)  # of the barrier at the contacts found last [N]
