@@ -7,6 +7,7 @@ import math
 from bilayer_core.engine.actuation import Actuation, drive_step, take_first_stimuli
 from bilayer_core.engine.configuration import move, take_state
 from bilayer_core.engine.laws import grow
+from bilayer_core.engine.linear.assembly import expand_gradient
 from bilayer_core.engine.linear.newton_matrix import solve
 from bilayer_core.engine.newton import first_guess_of
 from bilayer_core.engine.potential import (
@@ -33,7 +34,7 @@ DIRECTOR = 1024.0
 
 @record
 class Differences:
-    """Differences of gradients: by unknowns, of which those of a colour change together, and by laws."""
+    """Differences of gradients by unknowns, of which those of a colour change together."""
 
     colours: int  # of nodes
     ways: Matrix  # in which nodes move, shape (n_way, 3)
@@ -44,14 +45,26 @@ class Differences:
     )
     by_origin: Matrix
     by_director: Matrix  # of raised edges at the origin: for each colour of edges a row for each component
-    by_law: Matrix  # shape (n_law, size)
     pressing: Flags  # forces that are evaluated before others take anything from a configuration, shape (n_force,)
     following: Flags  # these others
 
 
 @record
+class StrainDifferences:
+    """Differences of gradients by eigenstrains, and by strains at the origin, of which those of a colour change
+    together.
+    """
+
+    by_law: Matrix  # shape (n_law, size)
+    colour: Indices  # of strains, −1 for those that stay
+    by_strain: Matrix  # a row for each colour
+
+
+@record
 class Lack:
-    """Entries of a matrix that a Hessian lacks, and the space of Krylov in which both are solved."""
+    """Entries of a matrix that a Hessian lacks, by motions of all nodes and forces on them, those among them that
+    bodies hold, and the space of Krylov in which both are solved.
+    """
 
     row: Indices
     column: Indices
@@ -60,6 +73,7 @@ class Lack:
     projected: Matrix  # H, shape (n_round, n_round + 1), a row for each vector
     turns: Matrix  # cosines and sines, shape (n_round, 2)
     rest: Vector  # shape (n_round + 1,)
+    spread: Vector  # motions, with those of nodes that bodies hold, shape (size,)
 
 
 @piece(int, Problem, StateArrays, Method, Actuation, StageInputs, Work, float, float, float, Configuration)
@@ -111,12 +125,27 @@ def _take(p, at, stage):
 
 
 @kernel
-def _add_gradient(p, at, stage, factor, out, row):
-    """Add a multiple of the gradient of the selected forces at a configuration to a row."""
+def _add_forces_on_nodes(p, at, stage, factor, out, row):
+    """Add a multiple of the gradient of the selected forces at a configuration to a row, that by nodes which bodies
+    hold in the places of these.
+    """
     if p.rod_contact.exists:
         find_rod_contacts(p, at)
     add_forces(p, at, stage, False, False)
+    expand_gradient(p.bonds, p.strands, p.sums)
+    _add_row(p, factor, out, row)
+
+
+@kernel
+def _add_gradient(p, at, stage, factor, out, row):
+    """Add a multiple of the gradient of the selected forces at a configuration to a row."""
+    add_forces(p, at, stage, False, False)
     expand_to_unknowns(p, at)
+    _add_row(p, factor, out, row)
+
+
+@kernel
+def _add_row(p, factor, out, row):
     rods = p.sums.gradient.shape[0]
     for j in range(rods):
         out[row, j] += factor * p.sums.gradient[j]
@@ -169,7 +198,7 @@ def differentiate_followed(p, differences, at, trial, stage, h):
             _select(differences.pressing, selected)
             follow(p, trial, stage)
             _select(differences.following, selected)
-            _add_gradient(p, at, stage, side / (2.0 * h), by_place, row)
+            _add_forces_on_nodes(p, at, stage, side / (2.0 * h), by_place, row)
     _select(differences.pressing, selected)
     follow(p, at, stage)
     _select(differences.following, selected)
@@ -178,12 +207,12 @@ def differentiate_followed(p, differences, at, trial, stage, h):
             _write_step(p, differences, row, side * h)
             _move_origin(p, stage, 1.0)
             _take(p, at, stage)
-            _add_gradient(p, at, stage, side / (2.0 * h), by_origin, row)
+            _add_forces_on_nodes(p, at, stage, side / (2.0 * h), by_origin, row)
             _move_origin(p, stage, -1.0)
     for row in range(differences.by_director.shape[0]):
         for side in range(-1, 2, 2):
             _move_directors(p, differences, row, side * h * DIRECTOR, stage)
-            _add_gradient(p, at, stage, side / (2.0 * h * DIRECTOR), differences.by_director, row)
+            _add_forces_on_nodes(p, at, stage, side / (2.0 * h * DIRECTOR), differences.by_director, row)
             _move_directors(p, differences, row, -side * h * DIRECTOR, stage)
     _take(p, at, stage)
     return READY
@@ -216,9 +245,9 @@ def differentiate_momentum(p, differences, at, trial, stage, h):
     return READY
 
 
-@piece(int, Problem, Work, Differences, Configuration, float)
+@piece(int, Problem, Work, StrainDifferences, Configuration, float)
 def differentiate_by_laws(p, work, differences, at, change):
-    """Write how the gradient of the selected forces at a configuration depends on the eigenstrain of each law."""
+    """Write how the gradient of the selected forces, without contact, depends on the eigenstrain of each law."""
     strain, stage, by_law = work.strain, work.stage, differences.by_law
     by_law[:] = 0.0
     for i in range(strain.shape[0]):
@@ -232,6 +261,53 @@ def differentiate_by_laws(p, work, differences, at, change):
     grow(p.drives, strain, stage.rest_edge, stage.rest_joint)
     start_elements(0, p, at, stage)
     return READY
+
+
+@piece(int, Problem, StrainDifferences, Configuration, Stage, float)
+def differentiate_by_strains(p, differences, at, stage, change):
+    """Write how the gradient of the selected forces, without contact, depends on strains at the origin."""
+    rows, colour, origin = differences.by_strain, differences.colour, stage.origin_strain
+    rows[:] = 0.0
+    for row in range(rows.shape[0]):
+        for side in range(-1, 2, 2):
+            for k in range(colour.shape[0]):
+                if colour[k] == row:
+                    origin[k] += side * change
+            start_elements(0, p, at, stage)
+            _add_gradient(p, at, stage, side / (2.0 * change), rows, row)
+            for k in range(colour.shape[0]):
+                if colour[k] == row:
+                    origin[k] -= side * change
+    start_elements(0, p, at, stage)
+    return READY
+
+
+@kernel
+def _spread(p, at, out):
+    """Write the motions of nodes that bodies hold from those of the bodies."""
+    constrained, rods = p.constrained, p.sums.gradient.shape[0]
+    for k in range(constrained.unknown.shape[0]):
+        a, f = constrained.unknown[k], constrained.free[k]
+        out[a] = out[a + 1] = out[a + 2] = 0.0
+        if f >= 0:
+            b = rods + 6 * f
+            for c in range(3):
+                i, j = (c + 1) % 3, (c + 2) % 3
+                out[a + c] = out[b + c] + out[b + 3 + i] * at.arm[k, j] - out[b + 3 + j] * at.arm[k, i]
+
+
+@kernel
+def _gather(p, at):
+    """Move forces on nodes that bodies hold to the bodies."""
+    constrained, gradient, body = p.constrained, p.sums.gradient, p.sums.body
+    for k in range(constrained.unknown.shape[0]):
+        a, f = constrained.unknown[k], constrained.free[k]
+        if f >= 0:
+            for c in range(3):
+                i, j = (c + 1) % 3, (c + 2) % 3
+                body[f, c] += gradient[a + c]
+                body[f, 3 + c] += at.arm[k, i] * gradient[a + j] - at.arm[k, j] * gradient[a + i]
+        gradient[a] = gradient[a + 1] = gradient[a + 2] = 0.0
 
 
 @kernel
@@ -254,10 +330,10 @@ def _dot(a, b):
     return total
 
 
-@piece(int, Problem, Lack, float)
-def solve_with_lack(p, lack, enough):
-    """Write the inverse of the factorised Hessian and of what it lacks together, times the present gradient, to
-    `System.step`, by GMRES with the Hessian before it; what is left over is `enough` of the whole at most.
+@piece(int, Problem, Configuration, Lack, float)
+def solve_with_lack(p, at, lack, enough):
+    """Write the inverse of the factorised Hessian of a configuration and of what it lacks together, times the present
+    gradient, to `System.step`, by GMRES with the Hessian before it; what is left over is `enough` of the whole at most.
     """
     basis, projected, turns, rest = lack.basis, lack.projected, lack.turns, lack.rest
     step, body_step, size, rods = p.system.step, p.system.body_step, basis.shape[1], p.sums.gradient.shape[0]
@@ -272,15 +348,19 @@ def solve_with_lack(p, lack, enough):
     for j in range(size):
         basis[0, j] /= whole
     while count < projected.shape[0] and abs(rest[count]) > enough * whole:
-        now, after = basis[count], basis[count + 1]
+        now, after, spread = basis[count], basis[count + 1], lack.spread
+        for j in range(size):
+            spread[j] = now[j]
+        _spread(p, at, spread)
         p.sums.gradient[:] = 0.0
         p.sums.body[:] = 0.0
         for m in range(lack.row.shape[0]):
-            j, force = lack.row[m], lack.value[m] * now[lack.column[m]]
+            j, force = lack.row[m], lack.value[m] * spread[lack.column[m]]
             if j < rods:
                 p.sums.gradient[j] += force
             else:
                 p.sums.body[(j - rods) // 6, (j - rods) % 6] += force
+        _gather(p, at)
         _solve(p, after)
         for j in range(size):
             after[j] += now[j]

@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import sparse
 
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.simulation.gradients.step_again import StepAgain, cross_matrix, left_jacobian, rotation_of
@@ -103,17 +102,6 @@ class BodyRates:
         np.add.at(found, self.unknown[self.free, :3], on)
         np.add.at(found, self.unknown[self.free, 3:], np.cross(self.arm[:, :, None], on, axis=1))
         return found
-
-    def matrix(self) -> sparse.csr_matrix:
-        """Return what `spread` does."""
-        size = len(self.freed)
-        crossing = -np.array([cross_matrix(a) for a in self.arm]).reshape(-1, 3, 3)
-        rows = np.broadcast_to(self.rows[:, :, None], crossing.shape)
-        columns = np.broadcast_to(self.unknown[self.free, None, 3:], crossing.shape)
-        of_turns = sparse.csr_matrix((crossing.ravel(), (rows.ravel(), columns.ravel())), shape=(size, size))
-        where = self.rows.ravel(), self.unknown[self.free, :3].ravel()
-        moves = sparse.csr_matrix((np.ones(self.rows.size), where), shape=(size, size))
-        return (sparse.diags(self.freed[:, 0]) + of_turns + moves).tocsr()
 
     # forward
 

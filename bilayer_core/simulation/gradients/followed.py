@@ -47,8 +47,6 @@ class Followed:
         self._turns = again.problem.space.exists
         self._colours, self._edge_colours = np.arange(nodes) % COLOURS, self._first % COLOURS
         self._shortest = float(strands.rest_length.min())
-        held = again.problem.constrained.node[again.problem.constrained.free >= 0]
-        self._held = self._near(held, 0)
         strand = np.zeros(nodes, dtype=int)
         strand[1:] = np.cumsum(~np.isin(np.arange(nodes - 1), self._first))
         station = [(again.of_nodes[i], again.of_edges[self._first == i]) for i in range(nodes)]
@@ -71,7 +69,9 @@ class Followed:
         self._from, self._row, self._column = (of.copy() for of in np.array(entries, dtype=np.int64).T)
 
     def matrices(self, again: StepAgain, n: int) -> Lacking:
-        """Return ∂g/∂z ∂z/∂q where stage n ended, and ∂g by the origin of the stage, shapes (size, size)."""
+        """Return ∂g/∂z ∂z/∂q where stage n ended, and ∂g by the origin of the stage, shapes (size, size): forces on all
+        nodes by motions of those that bodies do not hold.
+        """
         problem, stage, at = again.problem, again.stage, again.places[n + 1]
         rubbing = problem.rod_contact.exists and problem.rod_contact.sliding.count[0] > 0
         sliding = problem.sliding.exists and problem.sliding.count[0] > 0
@@ -84,7 +84,7 @@ class Followed:
             threshold = (problem.sliding if problem.sliding.exists else problem.rod_contact).threshold
             h = min(h, FINE * threshold * stage.length, FINE * again.gap)
         h = 2.0 ** math.floor(math.log2(h))  # which positions take without rounding
-        alone = np.union1d(self._alone(problem.rod_contact.sliding), self._held) if rubbing else self._held
+        alone = self._alone(problem.rod_contact.sliding) if rubbing else np.zeros(0, dtype=np.int64)
         colour, edge_colour = self._colours.copy(), self._edge_colours.copy()
         colour[alone] = COLOURS + np.arange(len(alone))
         edges = np.flatnonzero(np.isin(self._first, alone))
@@ -137,18 +137,13 @@ class Followed:
             by_place=np.zeros((rows + bodies, again.size)),
             by_origin=np.zeros((rows, again.size)),
             by_director=np.zeros((3 * (int(edge_colour.max()) + 1) if self._raised else 0, again.size)),
-            by_law=np.zeros((0, 0)),
             pressing=self._pressing,
             following=self._following,
         )
 
     def _alone(self, touching) -> Array:
         """Return nodes near which rods touch."""
-        return self._near(touching.node[: touching.count[0]].ravel(), 1)
-
-    def _near(self, nodes: Array, more: int) -> Array:
-        """Return nodes that see some, or `more` after them."""
-        near = nodes[:, None] + np.arange(-REACH, REACH + 1 + more)
+        near = touching.node[: touching.count[0]].ravel()[:, None] + np.arange(-REACH, REACH + 2)
         return np.intersect1d(near, np.append(self._first, self._first + 1))
 
     def _entries(self, rows: Array, colours: int, apart: tuple[Array, Array]) -> Entries:

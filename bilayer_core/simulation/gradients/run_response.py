@@ -295,7 +295,7 @@ class RunResponse:
         if momenta and len(free):
             speed[here.of_bodies[:, 3:]] = slope(momenta, h)
         rates = rate("strain_rate") if number.rates is None else np.zeros(here.end_rates.size)
-        return self._rates.constants.moves @ place, speed, rates, rate("transduction")
+        return self._rates.constants.moves[:, 0] * place, speed, rates, rate("transduction")
 
     def _momenta(self, again: StepAgain, state: State) -> Array:
         """Return the angular momenta of free bodies, shape (n_free, 3)."""
@@ -455,7 +455,7 @@ class RunResponse:
                     f"{' and '.join(SEEDS)} of nodes, finite, shape ({nodes}, 3)"
                 )
             (back.place if name == SEEDS[0] else back.speed)[here.of_nodes, 0] = given
-        back.place, back.speed = free @ back.place, free @ back.speed
+        back.place, back.speed = free * back.place, free * back.speed
         begun = self._rates_at_starts([number for number in numbers if number.rates is not None])
         found, self._forgets = np.zeros(len(numbers)), False
         given, tolerance = np.abs(back.place).max(), self._stepper.steps.newton_tolerance

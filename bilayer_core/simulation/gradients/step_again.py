@@ -17,11 +17,12 @@ from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.engine.linear.newton_matrix import solve
 from bilayer_core.engine.step_ends import end_stage
 from bilayer_core.engine.steps_again import (
-    Differences,
     Lack,
+    StrainDifferences,
     begin_stage,
     begin_step,
     differentiate_by_laws,
+    differentiate_by_strains,
     follow,
     solve_with_lack,
 )
@@ -36,11 +37,15 @@ from bilayer_core.simulation.surroundings import Surroundings
 
 Array = np.ndarray
 Lacking = tuple[Entries | None, Entries | None, Entries | None]
-"""What a Hessian lacks, and the gradient by the origin of a stage and directors there; None for nothing."""
+"""What a Hessian lacks, and the gradient by the origin of a stage and directors there; None for nothing. Forces are
+those on all nodes, those among them that bodies hold.
+"""
 ROUNDS, ROUNDED = 80, 1e-13
 """Of solutions with what a Hessian lacks: the most there may be, and what may be left, of the whole."""
 SMALL = 1e-3
 """Angles below which Jacobians are series [rad]."""
+ELASTIC = ("stretching", "bending", "twisting", "flattening", "bond", "viscosity")
+"""Forces that see eigenstrains."""
 MOST = 12
 """Corrections of a stage."""
 ENOUGH = 1e-13
@@ -123,6 +128,7 @@ class StepAgain(Evaluator):
         self._size = max(rod.path.length for rod in model.scene.rods)
         self._tolerance = tolerance
         self._settles = not {"friction", "rod friction"}.isdisjoint(model.forces)
+        self._elastic = [name for name in ELASTIC if name in model.forces]
         layout = self.problem.strands
         self.of_nodes = layout.node_unknown[:, None] + np.arange(3)
         self.of_edges = layout.edge_unknown
@@ -246,7 +252,7 @@ class StepAgain(Evaluator):
                 raise SimulationError("gradient: a step ends where the shape is unstable", self._step.begin)
             if k and self._settles:
                 lacking = matrices(self, n)
-            travel = -self.solved(gradient[:, None], lacking[0])[:, 0]
+            travel = -self.solved(n, gradient[:, None], lacking[0])[:, 0]
             moved = np.abs(travel[self.of_nodes]).max()
             turned = (
                 np.abs(travel[self.of_edges]).max(initial=0.0),
@@ -265,8 +271,8 @@ class StepAgain(Evaluator):
         bodies = at.body_position.copy(), at.body_rotation.copy()
         return Reached(at.position.copy(), turn, *bodies), float(moved), lacking
 
-    def solved(self, right: Array, lacking: Entries | None) -> Array:
-        """Return the inverse of the factorised Hessian and what it lacks together, times columns."""
+    def solved(self, n: int, right: Array, lacking: Entries | None) -> Array:
+        """Return the inverse of the factorised Hessian, where stage n ended, and what it lacks, times columns."""
         problem, sums, found = self.problem, self.sums, np.empty(right.shape)
         if lacking is not None:
             lack = Lack(row=lacking.row, column=lacking.column, value=lacking.value, **self._krylov)
@@ -275,7 +281,7 @@ class StepAgain(Evaluator):
             if lacking is None:
                 solve(problem)
             else:
-                solve_with_lack(problem, lack, ROUNDED)
+                solve_with_lack(problem, self.places[n + 1], lack, ROUNDED)
             found[: self._rods, k] = problem.system.step
             found[self._rods :, k] = problem.system.body_step.ravel()
         return -found if lacking is None else found
@@ -288,12 +294,18 @@ class StepAgain(Evaluator):
             "projected": np.zeros((ROUNDS, ROUNDS + 1)),
             "turns": np.zeros((ROUNDS, 2)),
             "rest": np.zeros(ROUNDS + 1),
+            "spread": np.zeros(self.size),
         }
 
-    def differentiate_by_laws(self, at: Configuration, differences: Differences, change: float) -> None:
-        """Write how the gradient at a configuration depends on the eigenstrain of each law; see `Differences`."""
-        self.select(at, None)
+    def differentiate_by_laws(self, at: Configuration, differences: StrainDifferences, change: float) -> None:
+        """Write how the gradient at a configuration depends on the eigenstrain of each law; see `StrainDifferences`."""
+        self.select(at, self._elastic)
         differentiate_by_laws(self.problem, self._work, differences, at, change)
+
+    def differentiate_by_strains(self, at: Configuration, differences: StrainDifferences, change: float) -> None:
+        """Write how the gradient at a configuration depends on strains at the origin; see `StrainDifferences`."""
+        self.select(at, self._elastic)
+        differentiate_by_strains(self.problem, differences, at, self.stage, change)
 
     def _expected(self, n: int) -> Reached:
         """Return where stage n ended, as far as both ends of the step tell."""

@@ -1,0 +1,363 @@
+"""Linear maps of a stage of a step that was made; `gradients.step_rates` has what they are for.
+
+∂g/∂η of eigenstrains and ∂σ/∂q of viscous strains are read off the gradient itself, which is linear in η and in the
+strains of the origin: one evaluation for as many of them as no unknown sees together.
+
+A frame turns by dω about its tangent beyond what parallel transport does. The turn a of an edge since the start of the
+step is counted along the way start → first guess → end, whose transport depends on where tangents are:
+
+    da = da₀ + dω − dω₀ + Σ ½ κb·(dt₁ + dt₂),    κb = 2 t₁ × t₂/(1 + t₁·t₂) of each part of the way
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bilayer_core.engine.steps_again import StrainDifferences
+from bilayer_core.model.model import Model
+from bilayer_core.model.records.step import Configuration
+from bilayer_core.scene.transduction import lagged
+from bilayer_core.simulation.gradients.body_rates import BodyRates
+from bilayer_core.simulation.gradients.entries import Entries
+from bilayer_core.simulation.gradients.followed import FOLLOWING, Followed
+from bilayer_core.simulation.gradients.step_again import KeptStep, Lacking, StepAgain
+
+Array = np.ndarray
+STRAIN = 1e-3
+"""Change of eigenstrains and of strains by which derivatives are read off."""
+_COMPONENT = np.array([0, 1, 2, 0, 1, 2, 3])
+_FORCE, _MOTION = np.array([1.0, 1, 1, -1, -1, -1, 1]), np.array([-1.0, -1, -1, 1, 1, 1, 1])
+"""Of the unknowns of an edge, two nodes and its turn: components of its vector and turn, and signs of forces."""
+
+
+def _triple(of: Array) -> Array:
+    """Return the matrices [v]× of vectors, shape (n, 3, 3)."""
+    out = np.zeros((len(of), 3, 3))
+    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -of[:, 2], of[:, 1], -of[:, 0]
+    return out - out.swapaxes(1, 2)
+
+
+class Constants:
+    """Matrices that rates of all steps of a model share, and which strains are apart from each other."""
+
+    def __init__(self, model: Model, again: StepAgain):
+        problem, strands = again.problem, again.problem.strands
+        self.size, self.strains = again.size, again.stage.origin_strain.size
+        self.whole = self.size + self.strains + again.wet
+        edges = strands.edge_count
+        self.in_space = problem.space.exists
+        self.nodes = again.of_nodes
+        self.before, self.after = self.nodes[strands.edge_node], self.nodes[strands.edge_node + 1]
+        self.of_edge = np.concatenate([self.before, self.after, strands.edge_unknown[:, None]], axis=1)
+        self.edge_of = np.full(self.size, -1)
+        self.edge_of[strands.edge_unknown] = np.arange(edges)
+        self.pairs = tuple(
+            np.broadcast_to(of, (edges, 7, 7)).ravel() for of in (self.of_edge[:, :, None], self.of_edge[:, None, :])
+        )
+        self.spin_inertia = strands.spin_inertia if self.in_space else 0.0 * strands.spin_inertia
+        self.damping = problem.damping
+        self.viscous = self._viscous(again)
+        self.mass, self.coupling = self._masses(again)
+        damped = np.full(self.whole, float(self.damping))
+        damped[again.of_bodies] = 0.0
+        self.damped = damped[:, None]
+        self.turn_inertia = self.spin_inertia
+        of_fluid = np.zeros(self.whole)
+        if problem.fluid.exists and self.in_space:
+            self.turn_inertia = self.spin_inertia + problem.fluid.mass[:, 2]
+            of_fluid[strands.edge_unknown] = problem.fluid.mass[:, 2]
+        self.mass = (self.mass + of_fluid)[:, None]
+        drag = np.concatenate([np.zeros(self.size), self.viscous, np.zeros(again.wet)])
+        self.drag = (drag - damped * of_fluid)[:, None]
+        self.of_strains = slice(self.size, self.size + self.strains)
+        self.of_fluid = slice(self.size + self.strains, self.whole)
+        free, moves = np.ones((self.size, 1)), np.ones((self.size, 1))
+        free[(problem.constrained.unknown[:, None] + np.arange(3)).ravel()] = 0.0
+        prescribed = problem.constrained.free < 0
+        moves[(problem.constrained.unknown[prescribed, None] + np.arange(3)).ravel()] = 0.0
+        self.free, self.moves = free, moves  # where anything depends on unknowns, and velocities on anything
+        self.colour, self.colours, self.seen = self._colours(again)
+        drives = problem.drives
+        rows = np.repeat(np.arange(len(drives.law_gain)), np.diff(drives.law_first))
+        within = np.arange(len(rows)) - drives.law_first[rows]
+        columns = drives.field_first[drives.law_field[rows]] + within
+        self.followed = np.zeros((len(drives.law_gain), again.transduction.size))
+        np.add.at(self.followed, (rows, columns), drives.law_weight[: len(rows)])
+        counts = np.diff(drives.field_first)
+        self.channel = np.repeat(drives.field_channel, counts)
+        self.raised_rows = problem.raised.first + 3 * problem.raised.slot[:, None] + np.arange(3)
+
+    def _masses(self, again: StepAgain) -> tuple[Array, Entries]:
+        """Return the diagonal of the masses, and what couples nodes and directors of raised edges."""
+        strands, raised, problem_bodies = again.problem.strands, again.problem.raised, again.problem.bodies
+        diagonal = np.zeros(self.whole)
+        diagonal[self.nodes] = strands.node_mass[:, None]
+        diagonal[strands.edge_unknown] = self.spin_inertia
+        diagonal[again.of_bodies[:, :3]] = problem_bodies.mass[:, None]
+        shape = len(raised.edge), 2, 3
+        own = np.broadcast_to(self.size + raised.first + 3 * raised.slot[:, None, None] + np.arange(3), shape)
+        diagonal[own[:, 0]] = raised.second_moment[:, None]
+        first = strands.edge_node[raised.edge]
+        node = np.stack([self.nodes[first], self.nodes[first + 1]], axis=1)
+        value = np.broadcast_to(raised.first_moment.reshape(-1, 2, 1), shape).ravel()
+        half = Entries(node.ravel(), own.ravel(), value, (self.whole, self.whole))
+        return diagonal, half + half.T
+
+    def masses(self, of: Array) -> Array:
+        """Return 𝓜 times columns."""
+        return self.mass * of + self.coupling @ of if len(self.coupling.row) else self.mass * of
+
+    def dissipation(self, of: Array) -> Array:
+        """Return 𝓓 times columns."""
+        return self.damped * self.masses(of) + self.drag * of
+
+    def _viscous(self, again: StepAgain) -> Array:
+        """Return the stiffness of each strain times its retardation time."""
+        problem, found = again.problem, np.zeros(self.strains)
+        strands, viscosity, bonds = problem.strands, problem.viscosity, problem.bonds
+        if viscosity.exists:
+            parts = [
+                strands.axial_stiffness * strands.rest_length * viscosity.edge_time,
+                (strands.joint_stiffness * viscosity.joint_time).ravel(),
+                bonds.stiffness.ravel() * viscosity.pair_time.ravel() if len(bonds.joint) else np.zeros(0),
+            ]
+            elements = np.concatenate(parts)
+            found[: len(elements)] = elements
+        return found
+
+    def _colours(self, again: StepAgain) -> tuple[Array, int, tuple[Array, Array]]:
+        """Return colours of viscous strains, −1 of others, such that those of one colour share no unknown, how many
+        there are, and each strain with each unknown that it depends on.
+        """
+        strands, bonds = again.problem.strands, again.problem.bonds
+        edges = strands.edge_count
+
+        def of(*which: int) -> Array:
+            inner = [e for e in which if e < edges]
+            nodes = {n for e in inner for n in (strands.edge_node[e], strands.edge_node[e] + 1)}
+            return np.concatenate([self.nodes[sorted(nodes)].ravel(), strands.edge_unknown[inner]]).astype(int)
+
+        colour = np.full(self.strains, -1)
+        viscous = np.flatnonzero(self.viscous > 0.0)
+        if not len(viscous):
+            return colour, 0, (viscous, viscous)
+        seen = [of(e) for e in range(edges)]
+        seen += [of(a, b) for a, b in zip(strands.joint_a, strands.joint_b, strict=True) for _ in range(3)]
+        for k in range(len(bonds.joint)):
+            own = of(strands.joint_a[bonds.joint[k]], strands.joint_b[bonds.joint[k]])
+            seen += [np.union1d(own, self.nodes[bonds.node[k]].ravel())] * 3
+        taken: list[set[int]] = []
+        for k in viscous:
+            unknowns = set(seen[k].tolist())
+            colour[k] = next((g for g, others in enumerate(taken) if others.isdisjoint(unknowns)), len(taken))
+            if colour[k] == len(taken):
+                taken.append(set())
+            taken[colour[k]] |= unknowns
+        which = np.repeat(viscous, [len(seen[k]) for k in viscous])
+        return colour, len(taken), (which, np.concatenate([seen[k] for k in viscous]))
+
+    # the turns of edges, by vectors along which their transport depends on the nodes, shape (n_edge, 3)
+
+    def along(self, way: Array, place: Array) -> Array:
+        """Return what motions turn edges by, shape (n_edge, n)."""
+        return np.einsum("ki,kin->kn", way, place[self.after] - place[self.before])
+
+    def along_back(self, way: Array, turns: Array) -> Array:
+        """Return the transpose times columns."""
+        found, by = np.zeros((self.size, turns.shape[1])), way[:, :, None] * turns[:, None, :]
+        found[self.after] += by  # each node is before one edge and after one
+        found[self.before] -= by
+        return found
+
+    def by_edges(self, blocks: Array) -> Entries:
+        """Return a matrix of blocks of edges: forces on their vectors and their moments, by changes of these vectors
+        and by turns, shape (n_edge, 4, 4).
+        """
+        value = blocks[:, _COMPONENT[:, None], _COMPONENT] * (_FORCE[:, None] * _MOTION)
+        return Entries(*self.pairs, value.ravel(), (self.size, self.size))
+
+
+class Strains:
+    """∂σ/∂q at a configuration: of viscous elements as given, and of directors of raised edges."""
+
+    def __init__(self, constants: Constants, again: StepAgain, at: Configuration, viscous: Entries | None):
+        self._constants, self._viscous, k = constants, viscous, again.problem.raised.edge
+        self._exist, nodes = len(k) > 0, constants.nodes
+        if not self._exist:
+            return
+        t, m1, first = at.tangent[k], at.director1[k], again.problem.strands.edge_node[k]
+        self._along = -t[:, :, None] * m1[:, None, :] / at.length[k, None, None]
+        self._before, self._after, self._turn = nodes[first], nodes[first + 1], again.of_edges[k]
+        self._across = at.director2[k][:, :, None] * float(constants.in_space)
+
+    def __matmul__(self, place: Array) -> Array:
+        constants = self._constants
+        found = np.zeros((constants.strains, place.shape[1])) if self._viscous is None else self._viscous @ place
+        if self._exist:
+            moved = self._along @ (place[self._after] - place[self._before])
+            found[constants.raised_rows] = moved + self._across * place[self._turn][:, None, :]
+        return found
+
+    def pull_back(self, strains: Array) -> Array:
+        """Return the transpose times columns."""
+        constants = self._constants
+        found = np.zeros((constants.size, strains.shape[1])) if self._viscous is None else self._viscous.T @ strains
+        if self._exist:
+            own = strains[constants.raised_rows]
+            pulled = self._along.swapaxes(1, 2) @ own  # each node is before one edge and after one
+            found[self._after] += pulled
+            found[self._before] -= pulled
+            found[self._turn] += (self._across * own).sum(axis=1)
+        return found
+
+
+@dataclass
+class StageRates:
+    """Linear maps of a stage; forces are those on all nodes, those among them that bodies hold."""
+
+    length: float
+    momentum_length: float
+    strains: Strains
+    by_laws: Array  # ∂g/∂η, of unknowns
+    lacking: Entries | None = None  # G
+    by_turn: Entries | None = None  # ∂g/∂a apart from the Hessian, shape (size, n_edge)
+    by_director: Entries | None = None  # ∂g by strains at the origin, by drag
+    by_origin: Entries | None = None  # ∂g/∂Ȳ by the gyroscopic force, shape (size, size)
+    bodies: BodyRates | None = None
+    momentum: tuple[Entries, Entries] | None = None  # of the fluid, by places at the end and by velocities
+    way: tuple[Array, ...] = ()  # of turns, by places at the start, at the first guess and at the end
+    law_by_mode: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    law_by_gain: Array = field(default_factory=lambda: np.zeros(0))
+    lag: Array = field(default_factory=lambda: np.zeros((3, 0)))  # ∂T/∂(T at the start, first, stimulus)
+
+
+class StageDerivatives:
+    """Makes the linear maps of stages of a model, of which `again` is at the end."""
+
+    def __init__(self, model: Model, again: StepAgain):
+        self.constants = Constants(model, again)
+        self._differences = StrainDifferences(
+            by_law=np.zeros((len(again.laws), again.size)),
+            colour=self.constants.colour,
+            by_strain=np.zeros((self.constants.colours, again.size)),
+        )
+        self.follower = Followed(model, again)
+        self._moving = [n for n in (*FOLLOWING, "inertia", "damping") if n in model.forces]
+
+    def strains(self, again: StepAgain, at: Configuration) -> Strains:
+        """Return ∂σ/∂q at a configuration."""
+        constants = self.constants
+        if not constants.colours:
+            return Strains(constants, again, at, None)
+        again.differentiate_by_strains(at, self._differences, STRAIN)
+        which, seen = constants.seen
+        value = self._differences.by_strain[constants.colour[which], seen]
+        value *= -again.stage.length / constants.viscous[which]
+        return Strains(constants, again, at, Entries(which, seen, value, (constants.strains, constants.size)))
+
+    def of(self, again: StepAgain, n: int, step: KeptStep, followed: Lacking) -> StageRates:
+        """Return the maps of stage n of a step; what its Hessian lacks by forces that follow is known."""
+        constants, stage, at = self.constants, again.stage, again.places[n + 1]
+        found = StageRates(stage.length, stage.momentum_length, self.strains(again, at), self._by_laws(again, at))
+        if again.of_bodies.size:
+            found.bodies = BodyRates(again, at, step.method.couplings[n, :n], again.turned[:n])
+        if constants.in_space:
+            self._turning(again, n, found)
+        if followed[0] is not None:
+            self._add_followed(found, *followed[:2])
+            found.by_director = followed[2]
+        if again.wet:
+            velocity = (at.position - stage.origin_position) / stage.length
+            found.momentum = self.follower.momentum(again, at, velocity)
+            again.follow(at)
+        drives, laws = again.problem.drives, again.laws
+        if len(laws):
+            slope = 1.0 - (laws / drives.law_saturation) ** 2
+            found.law_by_mode = (slope * drives.law_gain)[:, None] * constants.followed
+            found.law_by_gain = slope * (constants.followed @ again.transduction - drives.law_reference)
+        found.lag = self._lag(again, n, step)
+        return found
+
+    def _by_laws(self, again: StepAgain, at: Configuration) -> Array:
+        """Return ∂g/∂η, shape (size, n_law)."""
+        if not len(again.laws):
+            return np.zeros((self.constants.size, 0))
+        again.differentiate_by_laws(at, self._differences, STRAIN)
+        return self._differences.by_law.T.copy()
+
+    def _turning(self, again: StepAgain, n: int, found: StageRates) -> None:
+        """Add what the turns of edges, and their gyroscopic force, ask for."""
+        constants, stage, at, strands = self.constants, again.stage, again.places[n + 1], again.problem.strands
+        edges = len(constants.spin_inertia)
+        by_start, by_guess = _holonomy(edges, again.places[n], again.guesses[n])
+        more, by_end = _holonomy(edges, again.guesses[n], at)
+        found.way = by_start, by_guess + more, by_end
+        t, length, inertia = at.tangent[:edges], at.length[:edges, None], constants.spin_inertia[:, None]
+        x, origin, i = at.position, stage.origin_position, strands.edge_node
+        lengthened = (x[i + 1] - x[i]) - (origin[i + 1] - origin[i])
+        turned = (at.total_angle - stage.origin_angle)[:, None]
+        factor = inertia / (stage.length * length) ** 2
+        around = np.cross(t, lengthened)
+        force = factor * turned * around
+        along = (np.eye(3) - t[:, :, None] * t[:, None, :]) / length[:, :, None]
+        scaled, crossing = (factor * turned)[:, :, None], _triple(t)
+        again.forces(at, self._moving)
+        ahead = again.sums.edge[:edges, 3]  # moments of forces that see turns since the start of the stage
+        by_vector = scaled * (crossing - _triple(lengthened) @ along)
+        by_vector -= 2.0 * force[:, :, None] * (t / length)[:, None, :]
+        by_vector += 0.5 * crossing * (ahead / at.length[:edges] ** 2)[:, None, None]
+        spin = constants.turn_inertia / stage.momentum_length + constants.damping * constants.spin_inertia
+        by_turn = np.concatenate([factor * around, (spin / stage.length)[:, None]], axis=1)
+        blocks = np.zeros((edges, 4, 4))
+        blocks[:, :, :3] = by_turn[:, :, None] * by_end[:, None, :]
+        blocks[:, :3, :3] += by_vector
+        blocks[:, :3, 3] = by_turn[:, :3]
+        found.lacking = constants.by_edges(blocks)
+        column = np.repeat(np.arange(edges), 7)
+        value = (by_turn[:, _COMPONENT] * _FORCE).ravel()
+        found.by_turn = Entries(constants.of_edge.ravel(), column, value, (constants.size, edges))
+        blocks[:, 3] = 0.0
+        blocks[:, :3, :3] = -scaled * crossing
+        blocks[:, :3, 3] *= -1.0
+        found.by_origin = constants.by_edges(blocks)
+
+    def _add_followed(self, found: StageRates, by_place: Entries, by_origin: Entries) -> None:
+        """Add what forces take from the end of the stage, and their dependence on its origin.
+
+        They depend on turns over the stage: by the turn at its end as by that at its origin, but for the sign.
+        """
+        if found.way:
+            constants, edge = self.constants, self.constants.edge_of[by_origin.column]
+            turns = np.flatnonzero((edge >= 0) & (by_origin.value != 0.0))
+            row, edge, value = by_origin.row[turns], edge[turns], -by_origin.value[turns]
+            found.by_turn += Entries(row, edge, value, found.by_turn.shape)
+            by_nodes = value[:, None] * found.way[2][edge]
+            column = constants.of_edge[edge, :6].ravel()
+            value = np.concatenate([-by_nodes, by_nodes], axis=1).ravel()
+            by_place = by_place + found.lacking + Entries(np.repeat(row, 6), column, value, by_place.shape)
+            by_origin = by_origin + found.by_origin
+        found.lacking, found.by_origin = by_place, by_origin
+
+    def _lag(self, again: StepAgain, n: int, step: KeptStep) -> Array:
+        """Return what each mode takes of what it had reached, of the first stimulus and of that of the stage."""
+        drives, inputs, state = again.problem.drives, again.inputs, step.start
+        found = np.zeros((3, len(self.constants.channel)))
+        for m, channel in enumerate(self.constants.channel):
+            own = state.transduction[m], inputs.first[channel], inputs.stimulus[n, channel]
+            lags = float(drives.mode_rising[m]), float(drives.mode_falling[m])
+            lag = lags[0] if own[2] > own[0] else lags[1]  # on either side of it
+            for k in range(3):
+                unit = [float(j == k) for j in range(3)]
+                found[k, m] = lagged(*unit, lag, lag, float(inputs.elapsed[n]))
+        return found
+
+
+def _holonomy(edges: int, first: Configuration, second: Configuration) -> tuple[Array, Array]:
+    """Return by what changes of their vectors at both ends of a transport turn edges, beyond what frames turn, shapes
+    (n_edge, 3).
+    """
+    a, b = first.tangent[:edges], second.tangent[:edges]
+    half = np.cross(a, b) / (1.0 + np.einsum("ki,ki->k", a, b))[:, None]  # across both tangents
+    return half / first.length[:edges, None], half / second.length[:edges, None]
