@@ -23,7 +23,11 @@ from bilayer_core.forces.added_mass import fluid_momentum
 from bilayer_core.forces.elements import start_elements
 from bilayer_core.forces.rod_contact import find_rod_contacts
 from bilayer_core.jit import kernel, piece, record
-from bilayer_core.jit.record import Flags, Indices, Matrix, Vector
+from bilayer_core.jit.record import Flags, Indices, Matrix, Stack, Vector
+from bilayer_core.kinematics.copying import copy_matrix, copy_row
+from bilayer_core.kinematics.rotating import rotate_by, rotation_vector_between
+from bilayer_core.kinematics.vector import combine, cross, dot, scaled
+from bilayer_core.kinematics.vector import row as vector
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Method, Stage, StageInputs, StateArrays, Work
@@ -47,6 +51,26 @@ class Differences:
     by_director: Matrix  # of raised edges at the origin: for each colour of edges a row for each component
     pressing: Flags  # forces that are evaluated before others take anything from a configuration, shape (n_force,)
     following: Flags  # these others
+
+
+@record
+class Driven:
+    """Steps that were made, and the stimuli that act in them."""
+
+    begin: Vector  # [s]
+    length: Vector  # [s]
+    first: Matrix  # at the start of each, shape (n_step, n_channel)
+    stimulus: Stack  # at its stages, shape (n_step, n_stage, n_channel)
+
+
+@record
+class Reached:
+    """Where a stage ended."""
+
+    position: Matrix  # of nodes
+    turn: Vector  # of edges from the first guess [rad]
+    body_position: Matrix  # of free bodies
+    body_rotation: Stack
 
 
 @record
@@ -88,6 +112,24 @@ def begin_step(p, state, method, actuation, inputs, work, begin, h, same, start)
     return READY
 
 
+@piece(int, Actuation, Method, StageInputs, Driven, int, int, float, float)
+def drive_steps(actuation, method, inputs, driven, first, last, ahead, same):
+    """Write the stimuli that act in steps from the first one, before the last one, as far as they reach; return at
+    which they do not.
+    """
+    for k in range(first, last):
+        begin = driven.begin[k]
+        if k > first and not begin + ahead < actuation.horizon[0]:
+            return k
+        take_first_stimuli(actuation, begin, same, inputs)
+        drive_step(actuation, method.nodes, begin, driven.length[k], same, inputs)
+        for c in range(inputs.first.shape[0]):
+            driven.first[k, c] = inputs.first[c]
+            for n in range(method.couplings.shape[0]):
+                driven.stimulus[k, n, c] = inputs.stimulus[n, c]
+    return last
+
+
 @piece(int, Problem, StateArrays, Method, StageInputs, Work, int, float, Configuration, Configuration)
 def begin_stage(p, state, method, inputs, work, n, h, start, guess):
     """Start stage n of it from the configuration where the last one ended, up to the first guess; return a status."""
@@ -102,6 +144,78 @@ def begin_stage(p, state, method, inputs, work, n, h, start, guess):
         return status
     update_lagged(p, start, stage)
     return first_guess_of(p, start, inputs.position[n], inputs.rotation[n], stage, guess, False)
+
+
+@kernel
+def _turn_between(base, k, t, director):
+    """Return the angle about a unit tangent from the transported director of an edge to another one [rad]."""
+    a, m = vector(base.tangent, k), vector(base.director1, k)
+    factor = dot(m, t) / (1.0 + dot(a, t))
+    carried = combine(1.0, m, -factor, combine(1.0, a, 1.0, t))
+    return math.atan2(dot(cross(carried, director), t), dot(carried, director))
+
+
+@piece(int, Problem, StateArrays, StateArrays, Method, Work, int, float, Configuration, Configuration, Reached)
+def expect_end(p, start, end, method, work, n, h, first, guess, reached):
+    """Write where stage n ended, as far as both ends of the step tell; its start is the configuration `first`."""
+    strands, bodies, length, origin = p.strands, p.bodies, work.stage.length, work.origin
+    last = n + 1 == method.couplings.shape[0]
+    base = guess if last else first
+    reached.turn[:] = 0.0
+    for k in range(strands.edge_count if p.space.exists else 0):
+        i = strands.edge_node[k]
+        t = combine(1.0, vector(end.position, i + 1), -1.0, vector(end.position, i))
+        t = scaled(1.0 / math.sqrt(dot(t, t)), t)
+        reached.turn[k] = _turn_between(base, k, t, vector(end.director1, k))
+    if last:
+        for i in range(end.position.shape[0]):
+            for c in range(3):
+                reached.position[i, c] = end.position[i, c]
+        for f in range(bodies.mass.shape[0]):
+            copy_row(end.body_position, bodies.body_of_free[f], reached.body_position, f)
+            copy_matrix(end.body_rotation, bodies.body_of_free[f], reached.body_rotation, f)
+        return READY
+    coupling = method.couplings[n + 1, n]
+    along, bend = (method.along[n + 1] * h, method.bend * h * h) if method.history else (0.0, 0.0)
+    for i in range(end.position.shape[0]):
+        for c in range(3):
+            moved = end.position[i, c] - start.position[i, c] - length * end.velocity[i, c]
+            if method.history:
+                moved -= along * start.velocity[i, c] + bend * start.acceleration[i, c]
+            reached.position[i, c] = start.position[i, c] + origin.displacement[i, c] + moved / coupling
+    for k in range(reached.turn.shape[0]):
+        turned = reached.turn[k] - length * end.spin[k]
+        if method.history:
+            turned -= along * start.spin[k] + bend * start.spin_acceleration[k]
+        reached.turn[k] = origin.angle[k] + turned / coupling - work.start_angle[k] - guess.total_angle[k]
+    for f in range(bodies.mass.shape[0]):
+        b = bodies.body_of_free[f]
+        for c in range(3):
+            shift = end.body_position[b, c] - start.body_position[b, c] - length * end.body_velocity[b, c]
+            reached.body_position[f, c] = start.body_position[b, c] + origin.body_displacement[b, c] + shift / coupling
+        v = rotation_vector_between(first.body_rotation, f, end.body_rotation, b)
+        v = combine(1.0 / coupling, v, -length / coupling, vector(end.body_angular_velocity, b))
+        rotate_by(v[0], v[1], v[2], origin.rotation, b, reached.body_rotation, f)
+    return READY
+
+
+@piece(int, Problem, Stage, Configuration, Reached, Configuration)
+def go_to(p, stage, guess, reached, at):
+    """Move the first guess of a stage to where it ended."""
+    step, motion = p.system.step, p.system.body_step
+    step[:] = 0.0
+    for i in range(p.strands.node_unknown.shape[0]):
+        for c in range(3):
+            step[p.strands.node_unknown[i] + c] = reached.position[i, c] - guess.position[i, c]
+    for k in range(p.strands.edge_unknown.shape[0]):
+        step[p.strands.edge_unknown[k]] = reached.turn[k]
+    for f in range(motion.shape[0]):
+        v = rotation_vector_between(guess.body_rotation, f, reached.body_rotation, f)
+        for c in range(3):
+            motion[f, c] = reached.body_position[f, c] - guess.body_position[f, c]
+            motion[f, 3 + c] = v[c]
+    move(p, guess, 1.0, stage, at)
+    return READY
 
 
 @piece(bool, Problem, Configuration, Stage)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 
@@ -111,20 +112,36 @@ class Course:
             steps = list(self._made(span, end, maker))
             yield from reversed(steps) if backward else steps
 
+    def alike(self) -> Iterator[tuple[list[float], Method, State]]:
+        """Yield the ends of steps [s] that follow each other with the same method and from outside, the method, and a
+        state with what was set from outside.
+        """
+        outside = [span.outside.tobytes() for span in self._spans for _ in span.ends]
+        steps = zip(self.made, outside, strict=True)
+        for (stood_in, set_then), group in groupby(steps, key=lambda step: (step[0][1], step[1])):
+            state = self.start
+            _set_outside(state, np.frombuffer(set_then))
+            yield [end for (end, _), _ in group], self._method(stood_in), state
+
     def _made(self, span: _Span, end: Array, maker: Stepper) -> Iterator[KeptStep]:
         state = self._of(span.start)
-        place = 0
-        for name in FROM_OUTSIDE:
-            part = getattr(state, name)
-            part[...] = span.outside[place : place + part.size].reshape(part.shape)
-            place += part.size
+        _set_outside(state, span.outside)
         for k, (time, stood_in) in enumerate(zip(span.ends, span.stood_in, strict=True)):
-            start = state.copy()
+            start, state = state, state.copy()
             if k + 1 == len(span.ends):
                 state.values[:] = end
             else:
                 maker.make_again(state, time, stood_in)
-            yield KeptStep(start, state.copy(), self._method(stood_in))
+            yield KeptStep(start, state, self._method(stood_in))
 
     def _method(self, stood_in: bool) -> Method:
         return self._stepper.engine.methods[-1 if stood_in else 0]
+
+
+def _set_outside(state: State, outside: Array) -> None:
+    """Set what is set from outside."""
+    place = 0
+    for name in FROM_OUTSIDE:
+        part = getattr(state, name)
+        part[...] = outside[place : place + part.size].reshape(part.shape)
+        place += part.size

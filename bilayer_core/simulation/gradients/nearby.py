@@ -20,7 +20,6 @@ from bilayer_core.observed.frame import Description
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.simulation.capture import Capture, make_frame
 from bilayer_core.simulation.gains import put_gains
-from bilayer_core.simulation.gradients.step_again import tangents_of
 from bilayer_core.simulation.observation import strand
 from bilayer_core.simulation.statistics import RunStatistics
 from bilayer_core.simulation.stepper import Stepper
@@ -199,3 +198,9 @@ class Nearby:
         """Return quantities at a state, by their names."""
         self._put_gains()
         return values_of(self._stepper, state, wanted, self._description)
+
+
+def tangents_of(edge_node: Array, position: Array) -> Array:
+    """Return the unit tangents of edges, shape (n_edge, 3)."""
+    vector = position[edge_node + 1] - position[edge_node]
+    return vector / np.linalg.norm(vector, axis=1, keepdims=True)

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bilayer_core.engine.newton import SETTLED_WITHIN
+from bilayer_core.engine.steps_again import Driven, Reached, drive_steps
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.model.model import Model
 from bilayer_core.model.state import PARTS, State
@@ -36,7 +37,7 @@ from bilayer_core.simulation.gradients.nearby import (
     values_of,
 )
 from bilayer_core.simulation.gradients.parameters import STEP, laws_of, numbers_of, scale_of, scene_with
-from bilayer_core.simulation.gradients.step_again import KeptStep, Reached, StepAgain
+from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
 from bilayer_core.simulation.gradients.step_rates import Inputs, Rates, StepRates
 from bilayer_core.simulation.same_model import differing
 from bilayer_core.simulation.settling import SETTLE
@@ -73,14 +74,11 @@ NEAR = 1e-5
 
 @dataclass
 class Direct:
-    """Changes by a number alone in a step: of inputs, of the gradient where stages ended, and of the end.
+    """Changes by a number alone in a step: of the gradient where stages ended, and of the end.
 
-    Arrays are columns of `Inputs` and `Rates`; `next_rates` are `Number.rates` at the end of the step.
+    Arrays are columns of `Rates`; `next_rates` are `Number.rates` at the end of the step.
     """
 
-    first: Array
-    stimulus: Array
-    gain: Array
     gradient: list[Array]
     strain_rate: Array
     reached: Array
@@ -96,8 +94,11 @@ class Number:
     ----------
     path : str
     value, scale : float
-    laws : ndarray
-        Of which it is the gain.
+    gain : ndarray
+        1 for laws of which it is the gain, shape (n_law,).
+    first, stimulus : ndarray
+        Of stimuli at the start of each step and at its stages, the derivatives by it, shapes (n_step, n_channel),
+        (n_step, n_stage, n_channel).
     around : list of Surroundings
         Other stimuli, with it at `PLACES`, where it changes nothing else.
     agains : list of StepAgain
@@ -111,7 +112,9 @@ class Number:
     path: str
     value: float
     scale: float
-    laws: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    gain: Array
+    first: Array
+    stimulus: Array
     around: list[Surroundings] = field(default_factory=list)
     agains: list[StepAgain] = field(default_factory=list)
     own: bool = False
@@ -159,6 +162,14 @@ class RunResponse:
         self._here = agains[0]
         self._maker = builders.stepper_of(self.model)
         self._from_start = self._begins_at_start()
+        count, channels = len(course), len(self._here.inputs.first)
+        ends = np.array([float(course.start.time[0]), *(end for end, _ in course.made)])
+        self._driven = Driven(
+            begin=ends[:-1].copy(),
+            length=np.diff(ends),
+            first=np.zeros((count, channels)),
+            stimulus=np.zeros((count, self._stages, channels)),
+        )
 
     def _refuse(self) -> None:
         """Refuse what is not differentiated, by its name."""
@@ -195,6 +206,7 @@ class RunResponse:
         stepper = self._stepper
         return StepAgain(
             model,
+            self._builders.state_of(model),
             around,
             stepper.same_time,
             self._stages,
@@ -237,9 +249,12 @@ class RunResponse:
         return {name: [self._number(path, value, laws.get(path)) for path, value in of] for name, of in paths.items()}
 
     def _number(self, path: str, value: float, laws: Array | None) -> Number:
-        found = Number(path, value, scale_of(value))
+        driven = self._driven
+        found = Number(
+            path, value, scale_of(value), np.zeros(len(self._here.laws)), 0.0 * driven.first, 0.0 * driven.stimulus
+        )
         if laws is not None:
-            found.laws = laws
+            found.gain[laws] = 1.0
             return found
         scenes = [scene_with(self.scene, path, value + place * self._step * found.scale) for place in PLACES]
         if all(not differing(self.scene, scene) for scene in scenes):
@@ -247,6 +262,9 @@ class RunResponse:
             around = [Surroundings(model, self._stepper.ahead) for model in models]
             if path.startswith("stimuli."):
                 found.around = around
+                first, stimulus = zip(*map(self._drive, around), strict=True)
+                h = self._step * found.scale
+                found.first, found.stimulus = slope(first, h), slope(stimulus, h)
                 return found
             found.agains = [self._again(model, of) for model, of in zip(models, around, strict=True)]
         else:
@@ -265,12 +283,23 @@ class RunResponse:
             raise InputError(f"gradient: {path} changes how many unknowns the model has")
         return found
 
+    def _drive(self, around: Surroundings) -> tuple[Array, Array]:
+        """Return the stimuli at the start of each step and at its stages under other schedules."""
+        driven, done = self._driven, 0
+        for ends, method, state in self._course.alike():
+            last = done + len(ends)
+            while done < last:
+                around.cover(float(driven.begin[done]), state.override, state.pose_goal)
+                acts = around.actuation, method, self._here.inputs, driven
+                done = drive_steps(*acts, done, last, self._stepper.ahead, self._stepper.same_time)
+        return driven.first.copy(), driven.stimulus.copy()
+
     def _start(self, number: Number) -> tuple[Array, ...]:
         """Return how the start of the run depends on a number: place, speed, rate of strains, what modes reached."""
         here = self._here
         place, speed = np.zeros(here.size), np.zeros(here.size)
         own = self._course.start
-        if not self._from_start or number.laws.size:
+        if not self._from_start or number.gain.any():
             return place, speed, 0.0 * own.strain_rate, 0.0 * own.transduction
         h = self._step * number.scale
         states = [self._builders.state_of(of.model) for of in number.agains or number.around]
@@ -304,24 +333,15 @@ class RunResponse:
         return again.start_point(state, at).angular_momentum.copy()
 
     def _direct(self, number: Number, step: KeptStep, reached: Sequence[Reached]) -> Direct:
-        """Return what a number changes by itself in a step."""
-        here, h, count = self._here, self._step * number.scale, len(reached)
-        none = Inputs.zeros(here, count, 1)
+        """Return what a number changes by itself in a step, apart from stimuli and gains."""
+        here, h = self._here, self._step * number.scale
         found = Direct(
-            none.first[:, 0],
-            none.stimulus[:, :, 0],
-            none.gain[:, 0],
             [],
             np.zeros(here.end_rates.size),
             np.zeros(here.transduction.size),
             np.zeros(here.end_rates.size + here.wet),
         )
-        if number.laws.size:
-            found.gain[number.laws] = 1.0
-        elif number.around:
-            firsts, stimuli = zip(*(self._inputs(around, step, count) for around in number.around), strict=True)
-            found.first, found.stimulus = slope(firsts, h), slope(stimuli, h)
-        else:
+        if number.agains:
             own = number.rates or [None] * len(number.agains)
             seen = [
                 self._replayed(again, replace(step, start=self._fitted(again, step.start, rates)), reached)
@@ -334,14 +354,6 @@ class RunResponse:
             else:
                 found.next_rates = [(values[-2], values[-1]) for values in seen]
         return found
-
-    def _inputs(self, around: Surroundings, step: KeptStep, count: int) -> tuple[Array, Array]:
-        """Return the stimuli at the start of a step and at its stages under other schedules."""
-        here, own = self._here, self._here.surroundings
-        here.surroundings = around
-        here.begin(step)
-        here.surroundings = own
-        return here.inputs.first.copy(), here.inputs.stimulus[:count].copy()
 
     def _replayed(self, again: StepAgain, step: KeptStep, reached: Sequence[Reached]) -> list[Array]:
         """Return the gradients where stages ended, with another model, and what the state takes of the end."""
@@ -403,15 +415,13 @@ class RunResponse:
             along.place[:, k], along.speed[:, k], along.strain_rate[:, k], along.reached[:, k] = self._start(number)
         self._left, self._forgets = 0.0, False
         per = np.array([self._size / number.scale for number in numbers])
-        for step in self._course.steps(self._maker):
+        gain = np.stack([number.gain for number in numbers], axis=-1)
+        for k, step in enumerate(self._course.steps(self._maker)):
             reached = rates.take(step)
             self._note(step, reached)
             direct = [self._direct(number, step, reached) for number in numbers]
-            acts = Inputs(
-                np.stack([of.first for of in direct], axis=-1),
-                np.stack([of.stimulus for of in direct], axis=-1),
-                np.stack([of.gain for of in direct], axis=-1),
-            )
+            first = np.stack([number.first[k] for number in numbers], axis=-1)
+            acts = Inputs(first, np.stack([number.stimulus[k] for number in numbers], axis=-1), gain)
             for number, own in zip(numbers, direct, strict=True):
                 number.rates = own.next_rates
             none = np.zeros(self._here.size)
@@ -458,8 +468,10 @@ class RunResponse:
         back.place, back.speed = free * back.place, free * back.speed
         begun = self._rates_at_starts([number for number in numbers if number.rates is not None])
         found, self._forgets = np.zeros(len(numbers)), False
+        changing = [(k, number) for k, number in enumerate(numbers) if number.agains]
+        first, stimulus, gain = 0.0 * self._driven.first, 0.0 * self._driven.stimulus, np.zeros(len(here.laws))
         given, tolerance = np.abs(back.place).max(), self._stepper.steps.newton_tolerance
-        for step in self._course.steps(self._maker, backward=True):
+        for n, step in enumerate(self._course.steps(self._maker, backward=True), 1):
             reached = rates.take(step)
             end = back
             back, acts, direct = rates.backward(end)
@@ -467,14 +479,15 @@ class RunResponse:
                 self._look_at(back, step, given, self._size / (tolerance * step.length))
             for number, rates_at_starts in begun:
                 number.rates = rates_at_starts.pop()
-            for k, number in enumerate(numbers):
+            first[-n], stimulus[-n, : len(reached)] = acts.first[:, 0], acts.stimulus[:, :, 0]
+            gain += acts.gain[:, 0]
+            for k, number in changing:
                 own = self._direct(number, step, reached)
-                found[k] += own.first @ acts.first[:, 0] + own.gain @ acts.gain[:, 0]
-                found[k] += np.vdot(own.stimulus, acts.stimulus[:, :, 0])
                 found[k] += sum(g @ d[:, 0] for g, d in zip(own.gradient, direct, strict=False))
                 for part in AT_END:
                     found[k] += getattr(own, part) @ getattr(end, part)[:, 0]
         for k, number in enumerate(numbers):
+            found[k] += np.vdot(number.first, first) + np.vdot(number.stimulus, stimulus) + number.gain @ gain
             starts = zip(self._start(number), (back.place, back.speed, back.strain_rate, back.reached), strict=True)
             found[k] += sum(float(own @ by[:, 0]) for own, by in starts)
         return found.tolist()
@@ -506,7 +519,7 @@ class RunResponse:
         model = self.model
         if number.own:
             model = self._builders.model_of(scene_with(self.scene, number.path, number.value + way))
-        elif not number.laws.size:
+        elif not number.gain.any():
             model = replace(model, scene=scene_with(self.scene, number.path, number.value + way))
         stepper, evaluator = self._builders.stepper_of(model), self._again(model)
         state = self._fitted(evaluator, self._course.end, number.rates and number.rates[0])
@@ -529,9 +542,9 @@ class RunResponse:
         state.transduction += way * along.reached[:, k]
         gains = model.drives.law_gain.copy()
         try:
-            if number.laws.size:
+            if number.gain.any():
                 changed = gains.copy()
-                changed[number.laws] = number.value + way
+                changed[number.gain > 0.0] = number.value + way
                 put_gains(model, changed)
             return values_of(stepper, state, wanted, described(self._description, stepper))
         finally:

@@ -18,20 +18,22 @@ from bilayer_core.engine.linear.newton_matrix import solve
 from bilayer_core.engine.step_ends import end_stage
 from bilayer_core.engine.steps_again import (
     Lack,
+    Reached,
     StrainDifferences,
     begin_stage,
     begin_step,
     differentiate_by_laws,
     differentiate_by_strains,
+    expect_end,
     follow,
+    go_to,
     solve_with_lack,
 )
 from bilayer_core.errors import SimulationError
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.status import READY
-from bilayer_core.model.records.step import Configuration, Method
+from bilayer_core.model.records.step import Configuration, Method, StateArrays
 from bilayer_core.model.state import State
-from bilayer_core.simulation.edge_space import turn_between
 from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.surroundings import Surroundings
 
@@ -49,7 +51,7 @@ ELASTIC = ("stretching", "bending", "twisting", "flattening", "bond", "viscosity
 MOST = 12
 """Corrections of a stage."""
 ENOUGH = 1e-13
-"""Of the longest rod: a last correction. With friction the tolerance of the run is enough."""
+"""Of the longest rod: a last correction, where the tolerance of the run is less."""
 
 
 @dataclass(frozen=True)
@@ -78,24 +80,14 @@ class KeptStep:
         return float(self.end.time[0]) - self.begin
 
 
-@dataclass(frozen=True)
-class Reached:
-    """Where a stage ended: positions of nodes, shape (n_node, 3), turns of edges from its first guess, shape
-    (n_edge,), and poses of free bodies, shapes (n_free, 3), (n_free, 3, 3).
-    """
-
-    position: Array
-    turn: Array
-    body_position: Array
-    body_rotation: Array
-
-
 class StepAgain(Evaluator):
     """Makes kept steps again, without contact of friction, free bodies and fluids.
 
     Parameters
     ----------
     model : Model
+    state : State
+        Of it, with all that the states of steps have.
     surroundings : Surroundings
         What acts on it.
     same : float
@@ -113,18 +105,38 @@ class StepAgain(Evaluator):
         The start of the step, then the end of each stage.
     guesses : list of Configuration
         Where Newton's method began in each stage.
+    reached : Reached
+        Where the stage ended that was found last.
     size, wet : int
         Of unknowns, and of the fluid's momentum in their places.
     """
 
     def __init__(
-        self, model: Model, surroundings: Surroundings, same: float, stages: int, history: bool, tolerance: float
+        self,
+        model: Model,
+        state: State,
+        surroundings: Surroundings,
+        same: float,
+        stages: int,
+        history: bool,
+        tolerance: float,
     ):
         super().__init__(model, stages, history)
+        self._state, self._end = state.copy(), state.copy()
+        self._arrays, self._end_arrays = (
+            StateArrays(**{name: getattr(of, name) for name in StateArrays.names}) for of in (self._state, self._end)
+        )
         self.surroundings, self._same = surroundings, same
         self.places: list[Configuration] = [self.new() for _ in range(stages + 1)]
         self.guesses: list[Configuration] = [self.new() for _ in range(stages)]
         self.spare = self.new()
+        bodies = len(self.problem.bodies.mass)
+        self.reached = Reached(
+            position=np.zeros((model.node_count, 3)),
+            turn=np.zeros(len(self.problem.strands.edge_unknown)),
+            body_position=np.zeros((bodies, 3)),
+            body_rotation=np.zeros((bodies, 3, 3)),
+        )
         self._size = max(rod.path.length for rod in model.scene.rods)
         self._tolerance = tolerance
         self._settles = not {"friction", "rod friction"}.isdisjoint(model.forces)
@@ -132,7 +144,7 @@ class StepAgain(Evaluator):
         layout = self.problem.strands
         self.of_nodes = layout.node_unknown[:, None] + np.arange(3)
         self.of_edges = layout.edge_unknown
-        self._rods, bodies = len(self.sums.gradient), len(self.problem.bodies.mass)
+        self._rods = len(self.sums.gradient)
         self.size = self._rods + 6 * bodies
         self.of_bodies = self._rods + np.arange(6 * bodies).reshape(bodies, 6)
         self.wet = self.size if self.problem.fluid.exists else 0
@@ -191,13 +203,7 @@ class StepAgain(Evaluator):
 
     def go(self, n: int, reached: Reached) -> None:
         """Go from the first guess of stage n to where it ended."""
-        travel, guess = np.zeros(self.size), self.guesses[n]
-        travel[self.of_nodes] = reached.position - guess.position
-        travel[self.of_edges] = reached.turn
-        travel[self.of_bodies[:, :3]] = reached.body_position - guess.body_position
-        for f, rotation in enumerate(reached.body_rotation):
-            travel[self.of_bodies[f, 3:]] = rotation_vector(rotation @ guess.body_rotation[f].T)
-        self.travel(guess, travel, self.places[n + 1])
+        go_to(self.problem, self.stage, self.guesses[n], reached, self.places[n + 1])
         self.follow(self.places[n + 1])
 
     def travel(self, base: Configuration, travel: Array, at: Configuration) -> None:
@@ -241,7 +247,11 @@ class StepAgain(Evaluator):
         """Go to where stage n ended, and factorise the Hessian there; return where, the last correction [m], and what
         the Hessian lacks there, as `matrices` has it.
         """
-        self.go(n, self._expected(n))
+        work, step, reached = self._work, self._step, self.reached
+        self._end.take(step.end)
+        between = self._arrays, self._end_arrays, step.method, work, n, step.length
+        expect_end(self.problem, *between, self.places[0], self.guesses[n], reached)
+        self.go(n, reached)
         lacking: Lacking = (None, None, None)
         for k in range(MOST):
             at = self.places[n + 1]
@@ -259,7 +269,7 @@ class StepAgain(Evaluator):
                 np.abs(travel[self.of_bodies[:, 3:]]).max(initial=0.0),
             )
             moved = max(moved, self._size * max(turned), np.abs(travel[self.of_bodies[:, :3]]).max(initial=0.0))
-            if not moved > max(ENOUGH * self._size, self._settles * self._tolerance * self.stage.length):
+            if not moved > max(ENOUGH * self._size, self._tolerance * self.stage.length):
                 break
             self.travel(at, travel, self.spare)
             self.places[n + 1], self.spare = self.spare, at
@@ -267,9 +277,9 @@ class StepAgain(Evaluator):
         if lacking[0] is None:
             lacking = matrices(self, n)
         at = self.places[n + 1]
-        turn = at.total_angle - self.guesses[n].total_angle
-        bodies = at.body_position.copy(), at.body_rotation.copy()
-        return Reached(at.position.copy(), turn, *bodies), float(moved), lacking
+        reached.position[:], reached.turn[:] = at.position, at.total_angle - self.guesses[n].total_angle
+        reached.body_position[:], reached.body_rotation[:] = at.body_position, at.body_rotation
+        return reached, float(moved), lacking
 
     def solved(self, n: int, right: Array, lacking: Entries | None) -> Array:
         """Return the inverse of the factorised Hessian, where stage n ended, and what it lacks, times columns."""
@@ -307,37 +317,6 @@ class StepAgain(Evaluator):
         self.select(at, self._elastic)
         differentiate_by_strains(self.problem, differences, at, self.stage, change)
 
-    def _expected(self, n: int) -> Reached:
-        """Return where stage n ended, as far as both ends of the step tell."""
-        step, state, work, guess = self._step, self._step.start, self._work, self.guesses[n]
-        edges, h, end = len(self.of_edges), step.length, n + 1 == len(step.method.couplings)
-        base = guess if end else self.places[0]
-        turn = np.zeros(edges)
-        if self.problem.space.exists:
-            there = tangents_of(self.problem.strands.edge_node, step.end.position)
-            turn = turn_between(base.tangent[:edges], base.director1[:edges], there, step.end.director1)
-        free = self.problem.bodies.body_of_free
-        body, rotation = step.end.body_position[free], step.end.body_rotation[free]
-        if end:
-            return Reached(step.end.position, turn, body, rotation)
-        moved = step.end.position - state.position - self.stage.length * step.end.velocity
-        turned = turn - self.stage.length * step.end.spin
-        if step.method.history:
-            along, bend = step.method.along[n + 1] * h, step.method.bend * h * h
-            moved = moved - along * state.velocity - bend * state.acceleration
-            turned = turned - along * state.spin - bend * state.spin_acceleration
-        coupling = step.method.couplings[n + 1, n]
-        turned = work.origin.angle + turned / coupling - work.start_angle - guess.total_angle
-        shift = body - state.body_position[free] - self.stage.length * step.end.body_velocity[free]
-        body = state.body_position[free] + work.origin.body_displacement[free] + shift / coupling
-        first = self.places[0].body_rotation
-        rotation = np.empty_like(first)
-        for f, b in enumerate(free):
-            whole = rotation_vector(step.end.body_rotation[b] @ first[f].T)
-            part = (whole - self.stage.length * step.end.body_angular_velocity[b]) / coupling
-            rotation[f] = rotation_of(part) @ work.origin.rotation[b]
-        return Reached(state.position + work.origin.displacement + moved / coupling, turned, body, rotation)
-
 
 def cross_matrix(v: Array) -> Array:
     """Return the matrix [v]×, shape (3, 3)."""
@@ -357,16 +336,3 @@ def left_jacobian(v: Array) -> Array:
 def rotation_of(v: Array) -> Array:
     """Return exp([v]×)."""
     return np.eye(3) + cross_matrix(v) @ left_jacobian(v)
-
-
-def rotation_vector(rotation: Array) -> Array:
-    """Return v with exp([v]×), by less than half a turn."""
-    axis = 0.5 * (rotation[[2, 0, 1], [1, 2, 0]] - rotation[[1, 2, 0], [2, 0, 1]])
-    size = math.sqrt(float(axis @ axis))
-    return axis * (math.atan2(size, 0.5 * (np.trace(rotation) - 1.0)) / size) if size > 0.0 else axis
-
-
-def tangents_of(edge_node: Array, position: Array) -> Array:
-    """Return the unit tangents of edges, shape (n_edge, 3)."""
-    vector = position[edge_node + 1] - position[edge_node]
-    return vector / np.linalg.norm(vector, axis=1, keepdims=True)

@@ -20,9 +20,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bilayer_core.engine.steps_again import Reached
 from bilayer_core.model.model import Model
 from bilayer_core.simulation.gradients.stage_rates import StageDerivatives
-from bilayer_core.simulation.gradients.step_again import KeptStep, Reached, StepAgain
+from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
 
 Array = np.ndarray
 
