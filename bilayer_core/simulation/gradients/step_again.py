@@ -35,8 +35,10 @@ from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.surroundings import Surroundings
 
 Array = np.ndarray
-Lacking = tuple[Entries | None, Entries | None, Entries | None]
-"""What a Hessian lacks, and the gradient by the origin of a stage and directors there; None for nothing."""
+Lacking = tuple[Entries | None, Entries | None, Entries | None, Array | None]
+"""What a Hessian lacks, and the gradient by the origin of a stage, by directors there, and by the turns R̃ and spins ω̃
+of free bodies (`BodyRates.slides`); None for nothing.
+"""
 ROUNDS, ROUNDED = 80, 1e-13
 """Of solutions with what a Hessian lacks: the most there may be, and what may be left, of the whole."""
 SMALL = 1e-3
@@ -86,7 +88,7 @@ class Reached:
 
 
 class StepAgain(Evaluator):
-    """Makes kept steps again, without contact of friction, free bodies and fluids.
+    """Makes kept steps again.
 
     Parameters
     ----------
@@ -236,7 +238,7 @@ class StepAgain(Evaluator):
         the Hessian lacks there, as `matrices` has it.
         """
         self.go(n, self._expected(n))
-        lacking: Lacking = (None, None, None)
+        lacking: Lacking = (None, None, None, None)
         for k in range(MOST):
             at = self.places[n + 1]
             self.evaluate(at, second=True)

@@ -29,6 +29,7 @@ import numpy as np
 from scipy import sparse
 
 from bilayer_core.engine.steps_again import Differences
+from bilayer_core.forces.friction_change import FrozenChange
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.scene.transduction import lagged
@@ -317,10 +318,12 @@ class StepRates:
             ways=none,
             by_place=none,
             by_origin=none,
+            by_pose=none,
             by_director=none,
             by_law=np.zeros((len(agains[0].laws), agains[0].size)),
             pressing=np.zeros(0, dtype=bool),
             following=np.zeros(0, dtype=bool),
+            friction=FrozenChange.absent(),
             **empty,
         )
         self._follower = Followed(model, agains[0])
@@ -383,6 +386,8 @@ class StepRates:
         if followed[0] is not None:
             self._add_followed(found, *followed[:2])
             found.by_director = followed[2]
+        if found.bodies:
+            found.bodies.slides = followed[3]
         if again.wet:
             velocity = (at.position - stage.origin_position) / stage.length
             found.momentum = self._follower.momentum(again, at, velocity)
