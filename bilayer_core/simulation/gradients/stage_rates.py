@@ -268,6 +268,8 @@ class StageDerivatives:
         if followed[0] is not None:
             self._add_followed(found, *followed[:2])
             found.by_director = followed[2]
+            if found.bodies:
+                found.bodies.slide(followed[3])
         if again.wet:
             velocity = (at.position - stage.origin_position) / stage.length
             found.momentum = self.follower.momentum(again, at, velocity)

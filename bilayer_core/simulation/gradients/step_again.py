@@ -38,9 +38,9 @@ from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.surroundings import Surroundings
 
 Array = np.ndarray
-Lacking = tuple[Entries | None, Entries | None, Entries | None]
-"""What a Hessian lacks, and the gradient by the origin of a stage and directors there; None for nothing. Forces are
-those on all nodes, those among them that bodies hold.
+Lacking = tuple[Entries | None, Entries | None, Entries | None, Array | None]
+"""What a Hessian lacks, and the gradient by the origin of a stage, by directors there, and by the turns R̃ and spins ω̃
+of free bodies (`BodyRates.slides`); None for nothing. Forces are those on all nodes, those among them that bodies hold.
 """
 ROUNDS, ROUNDED = 80, 1e-13
 """Of solutions with what a Hessian lacks: the most there may be, and what may be left, of the whole."""
@@ -81,7 +81,7 @@ class KeptStep:
 
 
 class StepAgain(Evaluator):
-    """Makes kept steps again, without contact of friction, free bodies and fluids.
+    """Makes kept steps again.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ class StepAgain(Evaluator):
         between = self._arrays, self._end_arrays, step.method, work, n, step.length
         expect_end(self.problem, *between, self.places[0], self.guesses[n], reached)
         self.go(n, reached)
-        lacking: Lacking = (None, None, None)
+        lacking: Lacking = (None, None, None, None)
         for k in range(MOST):
             at = self.places[n + 1]
             self.evaluate(at, second=True)
