@@ -81,6 +81,7 @@ class Evaluator:
         self._work, self._inputs = new_work(sizes, [], stages), new_inputs(model, sizes, stages)
         self.stage: Stage = self._work.stage
         self.point: Point = self._work.origin
+        self._flags: dict[tuple[str, ...], Array] = {}  # of forces, by those that are selected
 
     @property
     def problem(self) -> Problem:
@@ -231,10 +232,12 @@ class Evaluator:
             If one does not act in the scene.
         """
         forces = self.model.forces if forces is None else tuple(forces)
-        for name in forces:
-            if name not in self.model.forces:
-                raise LookupError(f"force {name!r}: does not act in the scene, but: {', '.join(self.model.forces)}")
-        self.sums.selected[:] = [name in forces for name in NAMES]
+        if forces not in self._flags:
+            for name in forces:
+                if name not in self.model.forces:
+                    raise LookupError(f"force {name!r}: does not act in the scene, but: {', '.join(self.model.forces)}")
+            self._flags[forces] = np.array([name in forces for name in NAMES])
+        self.sums.selected[:] = self._flags[forces]
         start_elements(0, self.problem, at, self.stage)
 
     def forces(self, at: Configuration, forces: Iterable[str] | None = None) -> dict[str, float]:

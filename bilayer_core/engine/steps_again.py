@@ -95,6 +95,7 @@ class Lack:
     bodies hold, and the space of Krylov in which both are solved.
     """
 
+    count: Indices  # of entries, shape (1,)
     row: Indices
     column: Indices
     value: Vector
@@ -460,16 +461,20 @@ def differentiate_by_strains(p, differences, at, stage, change):
     """Write how the gradient of the selected forces, without contact, depends on strains at the origin."""
     rows, colour, origin = differences.by_strain, differences.colour, stage.origin_strain
     rows[:] = 0.0
+    start_elements(0, p, at, stage)
+    add_forces(p, at, stage, False, False)
+    expand_to_unknowns(p, at)
     for row in range(rows.shape[0]):
-        for side in range(-1, 2, 2):
-            for k in range(colour.shape[0]):
-                if colour[k] == row:
-                    origin[k] += side * change
-            start_elements(0, p, at, stage)
-            _add_gradient(p, at, stage, side / (2.0 * change), rows, row)
-            for k in range(colour.shape[0]):
-                if colour[k] == row:
-                    origin[k] -= side * change
+        _add_row(p, -1.0 / change, rows, row)
+    for row in range(rows.shape[0]):  # the gradient is linear in them
+        for k in range(colour.shape[0]):
+            if colour[k] == row:
+                origin[k] += change
+        start_elements(0, p, at, stage)
+        _add_gradient(p, at, stage, 1.0 / change, rows, row)
+        for k in range(colour.shape[0]):
+            if colour[k] == row:
+                origin[k] -= change
     start_elements(0, p, at, stage)
     return READY
 
@@ -546,7 +551,7 @@ def solve_with_lack(p, at, lack, enough):
         _spread(p, at, spread)
         p.sums.gradient[:] = 0.0
         p.sums.body[:] = 0.0
-        for m in range(lack.row.shape[0]):
+        for m in range(lack.count[0]):
             j, force = lack.row[m], lack.value[m] * spread[lack.column[m]]
             if j < rods:
                 p.sums.gradient[j] += force

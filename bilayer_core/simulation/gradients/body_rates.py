@@ -17,7 +17,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from bilayer_core.model.records.step import Configuration
-from bilayer_core.simulation.gradients.step_again import StepAgain, cross_matrix, left_jacobian, rotation_of
+from bilayer_core.simulation.gradients.step_again import (
+    StepAgain,
+    cross_matrices,
+    cross_matrix,
+    left_jacobian,
+    rotation_of,
+)
 
 Array = np.ndarray
 
@@ -78,8 +84,8 @@ class BodyRates:
                 unit = cross_matrix(np.eye(3)[c])
                 blocks["k_before"][f][:, c], blocks["k_end"][f][:, c] = _axial(unit @ a), _axial(-a @ unit)
         self._of = blocks
-        self._ahead = np.array([-cross_matrix(a) for a in stage.attached_arm[held]]).reshape(-1, 3, 3)
-        spinning = np.array([cross_matrix(spins[f]) for f in self.free]).reshape(-1, 3, 3)
+        self._ahead = -cross_matrices(stage.attached_arm[held])
+        spinning = cross_matrices(spins[self.free])
         self._by_turn, self._by_spin = self._ahead - h * spinning @ self._ahead, -h * self._ahead
         self.first = np.stack([np.eye(3)] * count) if count else np.zeros((0, 3, 3))
         self.chain: list[tuple[Array, Array]] = []  # of each earlier stage: what its gain does, and its turn

@@ -118,8 +118,8 @@ class Course:
         """
         outside = [span.outside.tobytes() for span in self._spans for _ in span.ends]
         steps = zip(self.made, outside, strict=True)
+        state = self.start
         for (stood_in, set_then), group in groupby(steps, key=lambda step: (step[0][1], step[1])):
-            state = self.start
             _set_outside(state, np.frombuffer(set_then))
             yield [end for (end, _), _ in group], self._method(stood_in), state
 

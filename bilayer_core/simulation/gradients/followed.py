@@ -31,8 +31,7 @@ FOLLOWING = ("drag", "turning drag", "added mass", "followers", "friction", "rod
 PRESSING = ("barrier", "rod barrier")
 """On which friction depends."""
 REACH = 2
-"""Nodes along a strand over which such a force at one depends on another."""
-COLOURS = 2 * REACH + 1
+"""Nodes along a strand over which such a force at one depends on another: 1 for drag at the curve."""
 FINE = 1e-5
 """Of the slip within which friction rests, of the smallest gap, and of a tenth of an edge: steps of differences."""
 SLIP = 1e-3
@@ -69,28 +68,36 @@ class Followed:
         self._pressing, self._following = (
             np.array([name in chosen for name in NAMES]) for chosen in (pressing, set(self._forces) - {"friction"})
         )
+        near_alone = set(self._forces) <= {"drag", "turning drag"} and not len(again.problem.raised.edge)
+        self._reach = 1 if near_alone else REACH
+        self._count = 2 * self._reach + 1
         strands, nodes = again.problem.strands, len(again.of_nodes)
         self._first, self._ways = strands.edge_node[: len(again.of_edges)], np.asarray(strands.axes)
         self._turns = again.problem.space.exists
-        self._colours, self._edge_colours = np.arange(nodes) % COLOURS, self._first % COLOURS
+        self._colours, self._edge_colours = np.arange(nodes) % self._count, self._first % self._count
+        self._shape, self._plain = (again.size, again.size), None
         self._shortest = float(strands.rest_length.min())
         strand = np.zeros(nodes, dtype=int)
         strand[1:] = np.cumsum(~np.isin(np.arange(nodes - 1), self._first))
         station = [(again.of_nodes[i], again.of_edges[self._first == i]) for i in range(nodes)]
         entries: list[tuple[int, int, int]] = []  # row of differences, row and column of the matrix
         for i in range(nodes):
-            near = [j for j in range(max(i - REACH, 0), min(i + REACH + 1, nodes)) if strand[j] == strand[i]]
-            seen, colour = np.concatenate([part for j in near for part in station[j]]), i % COLOURS
+            near = [
+                j for j in range(max(i - self._reach, 0), min(i + self._reach + 1, nodes)) if strand[j] == strand[i]
+            ]
+            seen, colour = np.concatenate([part for j in near for part in station[j]]), i % self._count
             for c in range(3):
                 entries += [(3 * colour + c, row, again.of_nodes[i, c]) for row in seen]
             for unknown in station[i][1] if self._turns else ():
-                entries += [(3 * COLOURS + colour, row, unknown) for row in seen]
+                entries += [(3 * self._count + colour, row, unknown) for row in seen]
         raised, of_directors = again.problem.raised, [(0, 0, 0)][:0]
         for edge, slot in zip(raised.edge, raised.slot, strict=True):
             i = self._first[edge]
-            near = [j for j in range(max(i - REACH, 0), min(i + REACH + 2, nodes)) if strand[j] == strand[i]]
+            near = [
+                j for j in range(max(i - self._reach, 0), min(i + self._reach + 2, nodes)) if strand[j] == strand[i]
+            ]
             for row in np.concatenate([part for j in near for part in station[j]]):
-                of_directors += [(3 * (i % COLOURS) + c, row, raised.first + 3 * slot + c) for c in range(3)]
+                of_directors += [(3 * (i % self._count) + c, row, raised.first + 3 * slot + c) for c in range(3)]
         self._raised = len(raised.edge) > 0 and not {"drag", "added mass"}.isdisjoint(model.forces)
         self._of_directors = [of.copy() for of in np.array(of_directors, dtype=np.int64).reshape(-1, 3).T]
         self._from, self._row, self._column = (of.copy() for of in np.array(entries, dtype=np.int64).T)
@@ -110,12 +117,19 @@ class Followed:
             alone = self._near(problem.rod_contact.sliding.node[: problem.rod_contact.sliding.count[0]].ravel())
         if sliding:
             alone = np.union1d(self._near(self._on_free(again)), alone)
+        if problem.sliding.exists and (len(alone) or self._plain is None):
             friction = _room_for(problem.sliding)
         colour, edge_colour = self._colours.copy(), self._edge_colours.copy()
-        colour[alone] = COLOURS + np.arange(len(alone))
+        colour[alone] = self._count + np.arange(len(alone))
         edges = np.flatnonzero(np.isin(self._first, alone))
-        edge_colour[edges] = COLOURS + np.arange(len(edges))
-        found, colours = self._differences(again, colour, edge_colour, friction), COLOURS + len(alone)
+        edge_colour[edges] = self._count + np.arange(len(edges))
+        if len(alone):
+            found = self._differences(again, colour, edge_colour, friction)
+        else:
+            found = self._plain = self._plain or self._differences(again, colour, edge_colour, friction)
+        for part in (found.by_place, found.by_origin, found.by_pose, found.by_director):
+            part[:] = 0.0
+        colours = self._count + len(alone)
         kept = [getattr(stage, name) for name in ORIGIN]
         before = [part.copy() for part in kept]
         if rubbing or self._otherwise:
@@ -148,7 +162,7 @@ class Followed:
         value = rows[place, row]
         of_alone = (raised.first + 3 * raised.slot[alone, None] + np.arange(3)).ravel()
         value[np.isin(column, of_alone)] = 0.0
-        own = 3 * (COLOURS + np.searchsorted(edges, raised.edge[alone]))[:, None] + np.arange(3)
+        own = 3 * (self._count + np.searchsorted(edges, raised.edge[alone]))[:, None] + np.arange(3)
         found = Entries(row, column, value, (size, again.stage.origin_strain.size))
         return found.beside(rows[own.ravel()], of_alone)
 
@@ -163,8 +177,8 @@ class Followed:
 
     def _differences(self, again: StepAgain, colour: Array, edge_colour: Array, friction: FrozenChange) -> Differences:
         """Return arrays for differences by unknowns of these colours."""
-        colours = max(COLOURS, int(colour.max()) + 1)
-        rows = colours * len(self._ways) + (max(COLOURS, int(edge_colour.max()) + 1) if self._turns else 0)
+        colours = max(self._count, int(colour.max()) + 1)
+        rows = colours * len(self._ways) + (max(self._count, int(edge_colour.max()) + 1) if self._turns else 0)
         bodies = again.of_bodies.size
         return Differences(
             colours=colours,
@@ -182,7 +196,7 @@ class Followed:
 
     def _near(self, nodes: Array) -> Array:
         """Return nodes that see some, or the next ones after them."""
-        near = nodes[:, None] + np.arange(-REACH, REACH + 2)
+        near = nodes[:, None] + np.arange(-self._reach, self._reach + 2)
         return np.intersect1d(near, np.append(self._first, self._first + 1))
 
     def _entries(self, rows: Array, colours: int, apart: tuple[Array, Array]) -> Entries:
@@ -191,13 +205,18 @@ class Followed:
         of_nodes = rows[: colours * len(ways)].reshape(colours, len(ways), size)
         of_nodes = (ways.T @ of_nodes).reshape(3 * colours, size)
         of_edges = rows[colours * len(ways) :]
-        columns = np.concatenate([of_nodes[: 3 * COLOURS], of_edges[:COLOURS]])
+        columns = np.concatenate([of_nodes[: 3 * self._count], of_edges[: self._count]])
         value = columns[self._from, self._row]
         if not len(apart[0]):
-            return Entries(self._row, self._column, value, (size, size))
+            return self._filled(value)
         value[np.isin(self._column, np.concatenate(apart))] = 0.0
-        found = Entries(self._row, self._column, value, (size, size))
-        return found.beside(of_nodes[3 * COLOURS :], apart[0]).beside(of_edges[COLOURS:], apart[1])
+        found = self._filled(value)
+        return found.beside(of_nodes[3 * self._count :], apart[0]).beside(of_edges[self._count :], apart[1])
+
+    def _filled(self, value: Array) -> Entries:
+        """Return the matrix with entries that are not 0."""
+        kept = np.flatnonzero(value)
+        return Entries(self._row[kept], self._column[kept], value[kept], self._shape)
 
     def momentum(self, again: StepAgain, at: Configuration, velocity: Array) -> tuple[Entries, Entries]:
         """Return how the fluid's momentum depends on a configuration and on velocities, shapes (size, size)."""
@@ -213,5 +232,5 @@ class Followed:
                 np.add.at(inertia, fluid.edge_node + end, halves)
         row, column = (np.broadcast_to(of, inertia.shape).ravel() for of in (nodes[:, :, None], nodes[:, None, :]))
         nothing = np.zeros(0, dtype=int), np.zeros(0, dtype=int)
-        by_place = self._entries(found.by_place[: len(found.by_origin)], COLOURS, nothing)
+        by_place = self._entries(found.by_place[: len(found.by_origin)], self._count, nothing)
         return by_place, Entries(row, column, inertia.ravel(), (size, size))

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
+from pydantic import ValidationError
 
 from bilayer_core.errors import InputError, SceneError
 from bilayer_core.model.model import Model
-from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.config import SceneConfig, Stimulus
 from bilayer_core.scene.loader import load_content, scene_content
 from bilayer_core.scene.overrides import read_overrides
 from bilayer_core.simulation.gains import alike_but_gains
@@ -70,7 +72,14 @@ def numbers_of(scene: SceneConfig, name: str) -> Iterator[tuple[str, float]]:
 
 
 def scene_with(scene: SceneConfig, path: str, value: float) -> SceneConfig:
-    """Return a scene with another number."""
+    """Return a scene with another number; of schedules only the channel is validated anew."""
+    name = next((name for name in scene.stimuli if path.startswith(f"stimuli.{name}.schedule.")), None)
+    if name is not None:
+        content = {"stimuli": {name: scene.stimuli[name].model_dump(mode="json", by_alias=True)}}
+        read_overrides({path: value})[0].apply(content)
+        with suppress(ValidationError):
+            changed = Stimulus.model_validate(content["stimuli"][name])
+            return scene.model_copy(update={"stimuli": scene.stimuli | {name: changed}})
     try:
         return load_content(scene_content(scene), {path: value})
     except SceneError as error:

@@ -299,7 +299,7 @@ class RunResponse:
         here = self._here
         place, speed = np.zeros(here.size), np.zeros(here.size)
         own = self._course.start
-        if not self._from_start or number.gain.any():
+        if not self._from_start or number.gain.any() or (number.around and not number.first[0].any()):
             return place, speed, 0.0 * own.strain_rate, 0.0 * own.transduction
         h = self._step * number.scale
         states = [self._builders.state_of(of.model) for of in number.agains or number.around]

@@ -22,7 +22,7 @@ from bilayer_core.scene.transduction import lagged
 from bilayer_core.simulation.gradients.body_rates import BodyRates
 from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.followed import FOLLOWING, Followed
-from bilayer_core.simulation.gradients.step_again import KeptStep, Lacking, StepAgain
+from bilayer_core.simulation.gradients.step_again import KeptStep, Lacking, StepAgain, cross_matrices
 
 Array = np.ndarray
 STRAIN = 1e-3
@@ -32,11 +32,9 @@ _FORCE, _MOTION = np.array([1.0, 1, 1, -1, -1, -1, 1]), np.array([-1.0, -1, -1, 
 """Of the unknowns of an edge, two nodes and its turn: components of its vector and turn, and signs of forces."""
 
 
-def _triple(of: Array) -> Array:
-    """Return the matrices [v]× of vectors, shape (n, 3, 3)."""
-    out = np.zeros((len(of), 3, 3))
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -of[:, 2], of[:, 1], -of[:, 0]
-    return out - out.swapaxes(1, 2)
+def _cross(a: Array, b: Array) -> Array:
+    """Return a × b, shape (n, 3), at a fifth of what numpy's costs."""
+    return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
 
 
 class Constants:
@@ -301,13 +299,13 @@ class StageDerivatives:
         lengthened = (x[i + 1] - x[i]) - (origin[i + 1] - origin[i])
         turned = (at.total_angle - stage.origin_angle)[:, None]
         factor = inertia / (stage.length * length) ** 2
-        around = np.cross(t, lengthened)
+        around = _cross(t, lengthened)
         force = factor * turned * around
         along = (np.eye(3) - t[:, :, None] * t[:, None, :]) / length[:, :, None]
-        scaled, crossing = (factor * turned)[:, :, None], _triple(t)
+        scaled, crossing = (factor * turned)[:, :, None], cross_matrices(t)
         again.forces(at, self._moving)
         ahead = again.sums.edge[:edges, 3]  # moments of forces that see turns since the start of the stage
-        by_vector = scaled * (crossing - _triple(lengthened) @ along)
+        by_vector = scaled * (crossing - cross_matrices(lengthened) @ along)
         by_vector -= 2.0 * force[:, :, None] * (t / length)[:, None, :]
         by_vector += 0.5 * crossing * (ahead / at.length[:edges] ** 2)[:, None, None]
         spin = constants.turn_inertia / stage.momentum_length + constants.damping * constants.spin_inertia
@@ -361,5 +359,5 @@ def _holonomy(edges: int, first: Configuration, second: Configuration) -> tuple[
     (n_edge, 3).
     """
     a, b = first.tangent[:edges], second.tangent[:edges]
-    half = np.cross(a, b) / (1.0 + np.einsum("ki,ki->k", a, b))[:, None]  # across both tangents
+    half = _cross(a, b) / (1.0 + np.einsum("ki,ki->k", a, b))[:, None]  # across both tangents
     return half / first.length[:edges, None], half / second.length[:edges, None]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -140,6 +139,7 @@ class StepAgain(Evaluator):
         self._size = max(rod.path.length for rod in model.scene.rods)
         self._tolerance = tolerance
         self._settles = not {"friction", "rod friction"}.isdisjoint(model.forces)
+        self._lack: Lack | None = None
         self._elastic = [name for name in ELASTIC if name in model.forces]
         layout = self.problem.strands
         self.of_nodes = layout.node_unknown[:, None] + np.arange(3)
@@ -285,7 +285,7 @@ class StepAgain(Evaluator):
         """Return the inverse of the factorised Hessian, where stage n ended, and what it lacks, times columns."""
         problem, sums, found = self.problem, self.sums, np.empty(right.shape)
         if lacking is not None:
-            lack = Lack(row=lacking.row, column=lacking.column, value=lacking.value, **self._krylov)
+            lack = self._lack_of(lacking)
         for k in range(right.shape[1]):
             sums.gradient[:], sums.body[:] = right[: self._rods, k], right[self._rods :, k].reshape(-1, 6)
             if lacking is None:
@@ -296,16 +296,24 @@ class StepAgain(Evaluator):
             found[self._rods :, k] = problem.system.body_step.ravel()
         return -found if lacking is None else found
 
-    @cached_property
-    def _krylov(self) -> dict[str, Array]:
-        """Scratch of `Lack`."""
-        return {
-            "basis": np.zeros((ROUNDS + 1, self.size)),
-            "projected": np.zeros((ROUNDS, ROUNDS + 1)),
-            "turns": np.zeros((ROUNDS, 2)),
-            "rest": np.zeros(ROUNDS + 1),
-            "spread": np.zeros(self.size),
-        }
+    def _lack_of(self, lacking: Entries) -> Lack:
+        """Return entries with scratch, the same as long as there is room."""
+        count, found = len(lacking.row), self._lack
+        if found is None or len(found.row) < count:
+            found = self._lack = Lack(
+                count=np.zeros(1, dtype=np.int64),
+                row=np.zeros(2 * count, dtype=np.int64),
+                column=np.zeros(2 * count, dtype=np.int64),
+                value=np.zeros(2 * count),
+                basis=np.zeros((ROUNDS + 1, self.size)),
+                projected=np.zeros((ROUNDS, ROUNDS + 1)),
+                turns=np.zeros((ROUNDS, 2)),
+                rest=np.zeros(ROUNDS + 1),
+                spread=np.zeros(self.size),
+            )
+        found.count[0] = count
+        found.row[:count], found.column[:count], found.value[:count] = lacking.row, lacking.column, lacking.value
+        return found
 
     def differentiate_by_laws(self, at: Configuration, differences: StrainDifferences, change: float) -> None:
         """Write how the gradient at a configuration depends on the eigenstrain of each law; see `StrainDifferences`."""
@@ -321,6 +329,13 @@ class StepAgain(Evaluator):
 def cross_matrix(v: Array) -> Array:
     """Return the matrix [v]×, shape (3, 3)."""
     return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+
+
+def cross_matrices(of: Array) -> Array:
+    """Return the matrices [v]× of vectors, shape (n, 3, 3)."""
+    out = np.zeros((len(of), 3, 3))
+    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -of[:, 2], of[:, 1], -of[:, 0]
+    return out - out.swapaxes(1, 2)
 
 
 def left_jacobian(v: Array) -> Array:
