@@ -91,14 +91,14 @@ class Followed:
             for unknown in station[i][1] if self._turns else ():
                 entries += [(3 * self._count + colour, row, unknown) for row in seen]
         raised, of_directors = again.problem.raised, [(0, 0, 0)][:0]
-        for edge, slot in zip(raised.edge, raised.slot, strict=True):
+        self._raised = len(raised.edge) > 0 and not {"drag", "added mass"}.isdisjoint(model.forces)
+        for edge, slot in zip(raised.edge, raised.slot, strict=True) if self._raised else ():
             i = self._first[edge]
             near = [
                 j for j in range(max(i - self._reach, 0), min(i + self._reach + 2, nodes)) if strand[j] == strand[i]
             ]
             for row in np.concatenate([part for j in near for part in station[j]]):
                 of_directors += [(3 * (i % self._count) + c, row, raised.first + 3 * slot + c) for c in range(3)]
-        self._raised = len(raised.edge) > 0 and not {"drag", "added mass"}.isdisjoint(model.forces)
         self._of_directors = [of.copy() for of in np.array(of_directors, dtype=np.int64).reshape(-1, 3).T]
         self._from, self._row, self._column = (of.copy() for of in np.array(entries, dtype=np.int64).T)
 
@@ -115,7 +115,7 @@ class Followed:
         if rubbing:
             h = min(h, FINE * problem.rod_contact.threshold * stage.length, FINE * again.gap)
             alone = self._near(problem.rod_contact.sliding.node[: problem.rod_contact.sliding.count[0]].ravel())
-        if sliding:
+        if sliding and again.of_bodies.size:
             alone = np.union1d(self._near(self._on_free(again)), alone)
         if problem.sliding.exists and (len(alone) or self._plain is None):
             friction = _room_for(problem.sliding)
@@ -169,8 +169,6 @@ class Followed:
     def _on_free(self, again: StepAgain) -> Array:
         """Return nodes of rods that rub on free bodies."""
         surfaces, sliding, free = again.problem.surfaces, again.problem.sliding, again.problem.bodies.free_index
-        if not len(free):
-            return np.zeros(0, dtype=int)
         which = np.arange(sliding.count[0])
         of_rods = surfaces.contact_point_body[sliding.first[which]] < 0
         return sliding.node[which[of_rods & (free[surfaces.body[sliding.surface[which]]] >= 0)]]

@@ -107,9 +107,9 @@ class Constants:
         """Return 𝓜 times columns."""
         return self.mass * of + self.coupling @ of if len(self.coupling.row) else self.mass * of
 
-    def dissipation(self, of: Array) -> Array:
-        """Return 𝓓 times columns."""
-        return self.damped * self.masses(of) + self.drag * of
+    def dissipation(self, of: Array, masses: Array) -> Array:
+        """Return 𝓓 times columns, from 𝓜 times these."""
+        return self.damped * masses + self.drag * of
 
     def _viscous(self, again: StepAgain) -> Array:
         """Return the stiffness of each strain times its retardation time."""
@@ -185,17 +185,17 @@ class Strains:
         self._exist, nodes = len(k) > 0, constants.nodes
         if not self._exist:
             return
-        t, m1, first = at.tangent[k], at.director1[k], again.problem.strands.edge_node[k]
-        self._along = -t[:, :, None] * m1[:, None, :] / at.length[k, None, None]
+        first = again.problem.strands.edge_node[k]
+        self._back, self._lifts = -at.tangent[k, :, None], at.director1[k, :, None] / at.length[k, None, None]
         self._before, self._after, self._turn = nodes[first], nodes[first + 1], again.of_edges[k]
-        self._across = at.director2[k][:, :, None] * float(constants.in_space)
+        self._across = at.director2[k, :, None] * float(constants.in_space)
 
     def __matmul__(self, place: Array) -> Array:
         constants = self._constants
         found = np.zeros((constants.strains, place.shape[1])) if self._viscous is None else self._viscous @ place
         if self._exist:
-            moved = self._along @ (place[self._after] - place[self._before])
-            found[constants.raised_rows] = moved + self._across * place[self._turn][:, None, :]
+            lifted = (self._lifts * (place[self._after] - place[self._before])).sum(axis=1, keepdims=True)
+            found[constants.raised_rows] = self._back * lifted + self._across * place[self._turn][:, None, :]
         return found
 
     def pull_back(self, strains: Array) -> Array:
@@ -204,8 +204,8 @@ class Strains:
         found = np.zeros((constants.size, strains.shape[1])) if self._viscous is None else self._viscous.T @ strains
         if self._exist:
             own = strains[constants.raised_rows]
-            pulled = self._along.swapaxes(1, 2) @ own  # each node is before one edge and after one
-            found[self._after] += pulled
+            pulled = self._lifts * (self._back * own).sum(axis=1, keepdims=True)
+            found[self._after] += pulled  # each node is before one edge and after one
             found[self._before] -= pulled
             found[self._turn] += (self._across * own).sum(axis=1)
         return found

@@ -173,8 +173,9 @@ class StepRates:
             if len(constants.channel):
                 reached += stage.lag[1][:, None] * acts.first[constants.channel]
                 reached += stage.lag[2][:, None] * acts.stimulus[n, constants.channel]
-            change = -constants.masses(origin + stage.length * origin_speed) / stage.momentum_length
-            change = (change - constants.dissipation(origin)) / stage.length
+            of_mass = constants.masses(origin)
+            change = -(of_mass + stage.length * constants.masses(origin_speed)) / stage.momentum_length
+            change = (change - constants.dissipation(origin, of_mass)) / stage.length
             right = change[:size] + stage.strains.pull_back(change[constants.of_strains])
             if stage.momentum:
                 right -= origin_speed[fluid] / stage.momentum_length
@@ -269,8 +270,10 @@ class StepRates:
                 ahead += bodies.push_back(right)
             if stage.momentum:
                 origin_speeds[n][fluid] -= right / stage.momentum_length
-            of_mass = constants.masses(change) / (stage.length * stage.momentum_length)
-            origins[n] -= of_mass + constants.dissipation(change) / stage.length
+            of_mass = constants.masses(change)
+            drag = constants.dissipation(change, of_mass) / stage.length
+            of_mass = of_mass / (stage.length * stage.momentum_length)
+            origins[n] -= of_mass + drag
             origin_speeds[n] -= stage.length * of_mass
             reached = end.reached if n + 1 == count else np.zeros_like(end.reached)
             if len(stage.law_by_gain):
