@@ -63,13 +63,13 @@ class Followed:
 
     def __init__(self, model: Model, again: StepAgain):
         self._forces = [name for name in FOLLOWING if name in model.forces]
+        self._otherwise = not set(self._forces) <= {"friction", "rod friction"}
         if not self._forces:
             return
         pressing = [name for name in PRESSING if name in model.forces]
         self._pressing, self._following = (
             np.array([name in chosen for name in NAMES]) for chosen in (pressing, set(self._forces) - {"friction"})
         )
-        self._otherwise = not set(self._forces) <= {"friction", "rod friction"}
         strands, nodes = again.problem.strands, len(again.of_nodes)
         self._first, self._ways = strands.edge_node[: len(again.of_edges)], np.asarray(strands.axes)
         self._turns = again.problem.space.exists

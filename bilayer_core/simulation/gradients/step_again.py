@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -58,11 +58,14 @@ class KeptStep:
     start, end : State
         Before and after; what is set from outside is as it acted.
     method : Method
+    spread : ndarray
+        Contacts that friction spread in its stages; see `Engine.spread`.
     """
 
     start: State
     end: State
     method: Method
+    spread: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @property
     def begin(self) -> float:
@@ -194,6 +197,10 @@ class StepAgain(Evaluator):
         for f, rotation in enumerate(reached.body_rotation):
             travel[self.of_bodies[f, 3:]] = rotation_vector(rotation @ guess.body_rotation[f].T)
         self.travel(guess, travel, self.places[n + 1])
+        if self._work.spread.size:
+            self._work.spread[:] = False
+            self._work.spread.ravel()[self._step.spread] = True
+            self.problem.sliding.spread.ravel()[:] = self._work.spread[n]
         self.follow(self.places[n + 1])
 
     def travel(self, base: Configuration, travel: Array, at: Configuration) -> None:
