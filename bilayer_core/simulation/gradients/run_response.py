@@ -67,6 +67,10 @@ AT_END = ("strain_rate", "reached", "strain_push")
 """Rates that a number changes by itself at the end of a step."""
 FORGETS = 1e6
 """Lengths of the rod by which a derivative by a number, times its size, moves it."""
+BESIDE, LEAST = 1e3, 1e-9
+"""Distance from the end of a step beyond which derivatives may be wrong, over what Newton's tolerance lets it be off,
+and of the longest rod.
+"""
 NEAR = 1e-5
 """h of a number, over its size, where barriers are steep."""
 
@@ -159,6 +163,7 @@ class RunResponse:
         self._here = agains[0]
         self._maker = builders.stepper_of(self.model)
         self._from_start = self._begins_at_start()
+        self._left = 0.0
 
     def _refuse(self) -> None:
         """Refuse what is not differentiated, by its name."""
@@ -426,7 +431,17 @@ class RunResponse:
         return along
 
     def _note(self, step: KeptStep, reached: Sequence[Reached]) -> None:
-        self._left = max(self._left, float(np.abs(reached[-1].position - step.end.position).max()))
+        """Note how far from the end of a step it ended now, and tell the first time that this is too far."""
+        left = float(np.abs(reached[-1].position - step.end.position).max())
+        most = max(BESIDE * self._stepper.steps.newton_tolerance * step.length, LEAST * self._size)
+        if left > most >= self._left:
+            warnings.warn(
+                f"gradient: the step from {step.begin:.6g} s, made again, ends {left:.2g} m beside where it ended in "
+                "the run: derivatives may be wrong; choose a smaller newton_tolerance",
+                RuntimeWarning,
+                stacklevel=5,
+            )
+        self._left = max(self._left, left)
 
     def _look_at(self, rates: Rates, step: KeptStep, per: Array | float, most: float) -> None:
         """Tell once where a motion has forgotten its start: where rates are `most` times `per` or more."""
@@ -457,10 +472,11 @@ class RunResponse:
             (back.place if name == SEEDS[0] else back.speed)[here.of_nodes, 0] = given
         back.place, back.speed = free @ back.place, free @ back.speed
         begun = self._rates_at_starts([number for number in numbers if number.rates is not None])
-        found, self._forgets = np.zeros(len(numbers)), False
+        found, self._left, self._forgets = np.zeros(len(numbers)), 0.0, False
         given, tolerance = np.abs(back.place).max(), self._stepper.steps.newton_tolerance
         for step in self._course.steps(self._maker, backward=True):
             reached = rates.take(step)
+            self._note(step, reached)
             end = back
             back, acts, direct = rates.backward(end)
             if given > 0.0:  # what Newton's method leaves then moves the end by more than the rod's length

@@ -180,13 +180,15 @@ class StepAgain(Evaluator):
 
     def start(self, n: int) -> None:
         """Start stage n, up to the first guess."""
-        step, places = self._step, (self.places[n], self.guesses[n])
+        step, places, origin = self._step, (self.places[n], self.guesses[n]), self.point
+        before = origin.vectors.copy(), origin.rotation.copy()
         while True:
             stage = self.problem, self._arrays, step.method, self._inputs, self._work
             status = begin_stage(*stage, n, step.length, *places)
             if status == READY:
                 return
             self._grow(status)
+            origin.vectors[:], origin.rotation[:] = before
 
     def go(self, n: int, reached: Reached) -> None:
         """Go from the first guess of stage n to where it ended."""
