@@ -68,6 +68,10 @@ AT_END = ("strain_rate", "reached", "strain_push")
 """Rates that a number changes by itself at the end of a step."""
 FORGETS = 1e6
 """Lengths of the rod by which a derivative by a number, times its size, moves it."""
+BESIDE, LEAST = 1e3, 1e-9
+"""Distance from the end of a step beyond which derivatives may be wrong, over what Newton's tolerance lets it be off,
+and of the longest rod.
+"""
 NEAR = 1e-5
 """h of a number, over its size, where barriers are steep."""
 
@@ -170,6 +174,7 @@ class RunResponse:
             first=np.zeros((count, channels)),
             stimulus=np.zeros((count, self._stages, channels)),
         )
+        self._left = 0.0
 
     def _refuse(self) -> None:
         """Refuse what is not differentiated, by its name."""
@@ -436,7 +441,17 @@ class RunResponse:
         return along
 
     def _note(self, step: KeptStep, reached: Sequence[Reached]) -> None:
-        self._left = max(self._left, float(np.abs(reached[-1].position - step.end.position).max()))
+        """Note how far from the end of a step it ended now, and tell the first time that this is too far."""
+        left = float(np.abs(reached[-1].position - step.end.position).max())
+        most = max(BESIDE * self._stepper.steps.newton_tolerance * step.length, LEAST * self._size)
+        if left > most >= self._left:
+            warnings.warn(
+                f"gradient: the step from {step.begin:.6g} s, made again, ends {left:.2g} m beside where it ended in "
+                "the run: derivatives may be wrong; choose a smaller newton_tolerance",
+                RuntimeWarning,
+                stacklevel=5,
+            )
+        self._left = max(self._left, left)
 
     def _look_at(self, rates: Rates, step: KeptStep, per: Array | float, most: float) -> None:
         """Tell once where a motion has forgotten its start: where rates are `most` times `per` or more."""
@@ -467,12 +482,13 @@ class RunResponse:
             (back.place if name == SEEDS[0] else back.speed)[here.of_nodes, 0] = given
         back.place, back.speed = free * back.place, free * back.speed
         begun = self._rates_at_starts([number for number in numbers if number.rates is not None])
-        found, self._forgets = np.zeros(len(numbers)), False
+        found, self._left, self._forgets = np.zeros(len(numbers)), 0.0, False
         changing = [(k, number) for k, number in enumerate(numbers) if number.agains]
         first, stimulus, gain = 0.0 * self._driven.first, 0.0 * self._driven.stimulus, np.zeros(len(here.laws))
         given, tolerance = np.abs(back.place).max(), self._stepper.steps.newton_tolerance
         for n, step in enumerate(self._course.steps(self._maker, backward=True), 1):
             reached = rates.take(step)
+            self._note(step, reached)
             end = back
             back, acts, direct = rates.backward(end)
             if given > 0.0:  # what Newton's method leaves then moves the end by more than the rod's length

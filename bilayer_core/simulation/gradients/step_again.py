@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -62,11 +62,14 @@ class KeptStep:
     start, end : State
         Before and after; what is set from outside is as it acted.
     method : Method
+    spread : ndarray
+        Contacts that friction spread in its stages; see `Engine.spread`.
     """
 
     start: State
     end: State
     method: Method
+    spread: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @property
     def begin(self) -> float:
@@ -193,17 +196,23 @@ class StepAgain(Evaluator):
 
     def start(self, n: int) -> None:
         """Start stage n, up to the first guess."""
-        step, places = self._step, (self.places[n], self.guesses[n])
+        step, places, origin = self._step, (self.places[n], self.guesses[n]), self.point
+        before = origin.vectors.copy(), origin.rotation.copy()
         while True:
             stage = self.problem, self._arrays, step.method, self._inputs, self._work
             status = begin_stage(*stage, n, step.length, *places)
             if status == READY:
                 return
             self._grow(status)
+            origin.vectors[:], origin.rotation[:] = before
 
     def go(self, n: int, reached: Reached) -> None:
         """Go from the first guess of stage n to where it ended."""
         go_to(self.problem, self.stage, self.guesses[n], reached, self.places[n + 1])
+        if self._work.spread.size:
+            self._work.spread[:] = False
+            self._work.spread.ravel()[self._step.spread] = True
+            self.problem.sliding.spread.ravel()[:] = self._work.spread[n]
         self.follow(self.places[n + 1])
 
     def travel(self, base: Configuration, travel: Array, at: Configuration) -> None:
