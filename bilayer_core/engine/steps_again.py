@@ -349,6 +349,16 @@ def _add_friction_change(p, differences, at, stage, out, row):
     _add_row(p, 1.0, out, row)
 
 
+@kernel
+def _any_spread(sliding):
+    if sliding.spreads:
+        for s in range(sliding.spread.shape[0]):
+            for i in range(sliding.spread.shape[1]):
+                if sliding.spread[s, i]:
+                    return True
+    return False
+
+
 @piece(int, Problem, Differences, Configuration, Configuration, Stage, float)
 def differentiate_friction(p, differences, at, trial, stage, h):
     """Add what `differentiate_followed` leaves out: friction on surfaces, and by poses of free bodies at the origin."""
@@ -359,16 +369,20 @@ def differentiate_friction(p, differences, at, trial, stage, h):
         p.sliding,
     )
     change = differences.friction
+    freeze_surface_contacts(sliding, p, at, stage)
     for row in range(by_place.shape[0]):
-        begin_change(sliding, p, at, stage, change)
+        begin_change(sliding, change)
         for side in range(-1, 2, 2):
             _write_step(p, differences, row, side * h)
             move(p, at, 1.0, stage, trial)
-            add_frozen(sliding, p, trial, at, stage, side / (2.0 * h), change)
+            freeze_surface_contacts(sliding, p, trial, stage)
+            add_frozen(sliding, p, at, stage, side / (2.0 * h), change)
+        freeze_surface_contacts(sliding, p, at, stage)
         _add_friction_change(p, differences, at, stage, by_place, row)
+    spread = _any_spread(sliding)  # else contacts freeze the same wherever the origin is
     for row in range(by_origin.shape[0] + by_pose.shape[0]):
         of_body = row - by_origin.shape[0]
-        begin_change(sliding, p, at, stage, change)
+        begin_change(sliding, change)
         if of_body < 0:
             _write_step(p, differences, row, h)
         for side in range(-1, 2, 2):
@@ -376,16 +390,19 @@ def differentiate_friction(p, differences, at, trial, stage, h):
                 _move_origin(p, stage, side)
             else:
                 _move_pose(p, stage, of_body // 9, of_body % 9, side * h)
-            add_frozen(sliding, p, at, at, stage, side / (2.0 * h), change)
+            if spread:
+                freeze_surface_contacts(sliding, p, at, stage)
+            add_frozen(sliding, p, at, stage, side / (2.0 * h), change)
             if of_body < 0:
                 _move_origin(p, stage, -side)
             else:
                 _move_pose(p, stage, of_body // 9, of_body % 9, -side * h)
+        if spread:
+            freeze_surface_contacts(sliding, p, at, stage)
         if of_body < 0:
             _add_friction_change(p, differences, at, stage, by_origin, row)
         else:
             _add_friction_change(p, differences, at, stage, by_pose, of_body)
-    freeze_surface_contacts(sliding, p, at, stage)
     return READY
 
 

@@ -18,7 +18,7 @@ import math
 from bilayer_core.contact.friction_law import friction_over_speed, friction_slope
 from bilayer_core.forces.contact_on_bodies import add_force
 from bilayer_core.forces.rod_arms import add_to_edges
-from bilayer_core.forces.surface_friction import contact_slip, freeze_surface_contacts, write_across
+from bilayer_core.forces.surface_friction import contact_slip, write_across
 from bilayer_core.jit import kernel, record
 from bilayer_core.jit.called import stack_vector
 from bilayer_core.jit.record import Indices, Matrix, Stack, Vector
@@ -45,9 +45,8 @@ class FrozenChange:
 
 
 @kernel
-def begin_change(sliding, p, at, stage, change):
-    """Freeze contacts at a configuration, and note which there are; nothing has changed."""
-    freeze_surface_contacts(sliding, p, at, stage)
+def begin_change(sliding, change):
+    """Note which contacts are frozen; nothing has changed."""
     change.count[0] = sliding.count[0]
     for k in range(sliding.count[0]):
         change.first[k], change.surface[k] = sliding.first[k], sliding.surface[k]
@@ -61,9 +60,8 @@ def begin_change(sliding, p, at, stage, change):
 
 
 @kernel
-def add_frozen(sliding, p, frozen_at, at, stage, factor, change):
-    """Freeze contacts at another configuration, and add a multiple of what they take there, with their slip at `at`."""
-    freeze_surface_contacts(sliding, p, frozen_at, stage)
+def add_frozen(sliding, p, at, stage, factor, change):
+    """Add a multiple of what contacts took where they were frozen last, with their slip at `at`."""
     for b in range(at.rotation.shape[0]):
         product_transposed(at.rotation, b, sliding.back, b, sliding.rotation, b)
     arm, lever, slip, j = stack_vector(3), stack_vector(3), stack_vector(3), 0
@@ -102,8 +100,7 @@ def _same(sliding, k, change, n):
 
 @kernel
 def add_changed_friction(sliding, p, at, stage, change):
-    """Freeze contacts anew where the change began, and add what it makes of their forces."""
-    freeze_surface_contacts(sliding, p, at, stage)
+    """Add what a change makes of the forces of contacts, which are frozen where it began."""
     for b in range(at.rotation.shape[0]):
         product_transposed(at.rotation, b, sliding.back, b, sliding.rotation, b)
     surfaces, sums, axis, mu = p.surfaces, p.sums, sliding.axis, sliding.mu
