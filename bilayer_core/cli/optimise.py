@@ -20,6 +20,13 @@ NOT_CONFIRMED = 1
 @click.argument("file", metavar="SWEEP")
 @click.option("--maximise", metavar="METRIC", help="Search for its largest value.")
 @click.option("--minimise", metavar="METRIC", help="Search for its least value.")
+@click.option(
+    "--method",
+    type=click.Choice(["search", "gradients"]),
+    default="search",
+    show_default=True,
+    help="How values are chosen: by Optuna, or along derivatives of runs.",
+)
 @click.option("--trials", type=click.IntRange(1), default=100, show_default=True, help="Runs, resumed ones included.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the search.")
 @click.option("--out", metavar="DIR", default=DEFAULT_DIRECTORY, show_default=True, help="Where results are written.")
@@ -53,7 +60,8 @@ def optimise(
 
     if (maximise is None) == (minimise is None):
         raise click.UsageError("give --maximise METRIC or --minimise METRIC")
-    require("optimise", "dask", "distributed", "optuna", "pyarrow", *(["matplotlib"] if plotted else []))
+    chooser = ["optuna"] if settings["method"] == "search" else []
+    require("optimise", "dask", "distributed", *chooser, "pyarrow", *(["matplotlib"] if plotted else []))
     compile_kernels(quiet)
     with runs_bar(settings["trials"], 0, quiet) as show:
         optimum = search.optimise(

@@ -1,6 +1,7 @@
 """Searches: they find what is known, go on after a kill, and confirm what they found."""
 
 import json
+import warnings
 from dataclasses import replace
 
 import pytest
@@ -11,9 +12,11 @@ from bilayer_core import load_scene, optimise
 from bilayer_core.cli import main
 from bilayer_core.cli.optimise import lines
 from bilayer_core.errors import InputError
+from bilayer_core.simulation.gradients.run_response import RunResponse
+from bilayer_core.studies.sweeps.ascent import Ascent, refuse_unclimbable
 from bilayer_core.studies.sweeps.execute_runs import execute
 from bilayer_core.studies.sweeps.journal import Journal
-from bilayer_core.studies.sweeps.optimise import Search, finer_job
+from bilayer_core.studies.sweeps.optimise import Search, finer_job, ranked, start_of
 from bilayer_core.studies.sweeps.run_sweep import read_sweep
 
 RANGES = {
@@ -43,7 +46,7 @@ def search_in_process(content, metric, trials, functions=None):
 
 def test_a_known_optimum_is_found(ranges):
     search, rows = search_in_process(ranges, "near", 40, NEAR)
-    best = search.ranked(rows)[0]
+    best = ranked(rows, search.metric, search.largest)[0]
     assert best.parameters["length"] == 100.0
     assert best.parameters["gain"] == pytest.approx(1.7, abs=0.05)
 
@@ -130,3 +133,113 @@ def test_a_metric_that_no_run_has_is_told_with_how_runs_ended(ranges, cluster):
     ranges["metrics"] = {"contact": "min_gap"}
     with pytest.raises(InputError, match="metric 'contact': no run has a value of it; 2 runs were made"):
         optimise(ranges, "contact", trials=2, scheduler=cluster)
+
+
+STRAIGHT = {
+    "gain": {"path": "rods.strip.layers.active.eigenstrain.gain", "from": "-2 %", "to": "2 %", "start": "1.5 %"},
+    "level": {"path": "stimuli.swelling.schedule.to", "from": 0.4, "to": 0.9, "start": 0.8},
+}
+STRAIGHTEST = 100.0 * 6.0 / (2.0 * 75.0**2)
+"""Growth ε at which x = ½ L (1 + ½ ε)(1 − (κ L)²/12), κ L = 1.5 ε L/h = 75 ε, is largest [%]."""
+REACH = {"reach": {"quantity": "com.x", "take": "last"}}
+
+
+@pytest.fixture
+def straight():
+    """A strip that grows and bends, so that there is a growth with which its mass centre is farthest out."""
+    return {**STRIP, "parameters": STRAIGHT, "metrics": REACH}
+
+
+def climb_in_process(content, trials, seed=3, largest=True):
+    """A search by derivatives without processes, as `optimise` makes it with one worker."""
+    read = read_sweep(content, is_search=True)
+    refuse_unclimbable(read, "reach")
+    read = replace(read, job=replace(read.job, slope_of="reach"))
+    climbs, rows = Ascent(read, "reach", largest, seed, start_of(read)), []
+    for _ in range(trials):
+        point = climbs.ask()
+        rows += execute(read.job, [point])
+        climbs.tell(point.number, rows[-1])
+    return climbs, rows
+
+
+def test_climbs_along_derivatives_find_a_known_optimum(straight):
+    climbs, rows = climb_in_process(straight, 16)
+    best = ranked(rows, "reach", True)[0]
+    assert rows[0].parameters == pytest.approx({"gain": 1.5, "level": 0.8})
+    grown = 0.3 * best.parameters["gain"] * best.parameters["level"]  # at the end, 0.3 s into the ramp [%]
+    assert grown == pytest.approx(STRAIGHTEST, rel=0.05)  # it still moves
+    assert climb_in_process(straight, 16)[1][-1].parameters == rows[-1].parameters
+
+
+def test_climbs_stay_within_ranges_and_go_along_their_ends(straight):
+    straight["parameters"] = {**STRAIGHT, "gain": {**STRAIGHT["gain"], "from": "0.5 %"}}
+    _, rows = climb_in_process(straight, 12)
+    best = ranked(rows, "reach", True)[0].parameters
+    assert (best["gain"], best["level"]) == pytest.approx((0.503, 0.401), abs=1e-9)
+    assert all(0.5 <= row.parameters["gain"] <= 2.0 for row in rows)
+
+
+def test_the_least_value_is_found_by_going_down(straight):
+    _, rows = climb_in_process(straight, 12, largest=False)
+    best = ranked(rows, "reach", False)[0].parameters
+    assert abs(best["gain"]) > 1.9 and best["level"] > 0.89
+
+
+def test_derivatives_of_a_run_are_those_by_parameters_in_their_units(straight):
+    straight["set"] = {"duration": 0.3, "solver.tolerance": None, "solver.dt": "2 ms", "solver.newton_tolerance": 1e-9}
+    read = read_sweep(straight, is_search=True)
+    job = replace(read.job, slope_of="reach")
+    values = {"gain": 1.0, "level": 0.7}
+    (row,) = execute(job, [read.point(0, values)])
+    for name, h in (("gain", 1e-3), ("level", 1e-3)):
+        points = [read.point(0, values | {name: values[name] + side * h}) for side in (1.0, -1.0)]
+        above, below = (found.metrics["reach"] for found in execute(read.job, points))
+        assert row.slopes[name] == pytest.approx((above - below) / (2.0 * h), rel=1e-4), name
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({"metrics": {"reach": {"quantity": "com.x", "take": "max"}}}, "must be the last value or the change of com.x"),
+        ({"metrics": {"reach": "mean_curvature"}}, "metric 'reach' must be the last value"),
+        (
+            {"metrics": {"reach": {"quantity": "com.x", "take": "change"}}, "set": {"start": "settle"}},
+            "must be the last value where the start settles",
+        ),
+        (
+            {"parameters": {"gain": {**STRAIGHT["gain"], "whole": True}}},
+            "parameter 'gain' must have a range of numbers",
+        ),
+        ({"parameters": {"length": RANGES["length"]}}, "parameter 'length' must have a range of numbers"),
+        (
+            {
+                "parameters": {"length": {"path": "rods.strip.path.length", "from": "90 mm", "to": "110 mm"}},
+                "metrics": {"reach": {"quantity": "com.x", "take": "change"}},
+            },
+            "parameter 'length' is neither a gain nor of a stimulus",
+        ),
+    ],
+)
+def test_what_has_no_derivatives_is_refused_by_name(straight, changes, told):
+    with pytest.raises(InputError, match=told):
+        optimise(straight | changes, "reach", method="gradients", trials=1)
+
+
+def test_a_search_by_derivatives_that_tell_nothing_says_so(straight, monkeypatch):
+    def look(*_):
+        warnings.warn("gradient: the motion forgets its start: …", RuntimeWarning, stacklevel=2)
+
+    monkeypatch.setattr(RunResponse, "_look_at", look)
+    climbs, rows = climb_in_process(straight, 3)
+    assert climbs.is_lost and "forgets its start" in climbs.found_none
+    assert rows[0].outcome == "done" and rows[0].slopes == {}
+
+
+def test_a_search_by_derivatives_on_processes_is_confirmed_and_resumed(straight, cluster, tmp_path):
+    options = {"scheduler": cluster, "out": tmp_path, "method": "gradients"}
+    first = optimise(straight, "reach", trials=6, **options)
+    seen = []
+    second = optimise(straight, "reach", trials=10, resume=True, progress=seen.append, **options)
+    assert second.is_confirmed and second.value >= first.value > first.start
+    assert len(seen) <= 10

@@ -21,7 +21,8 @@ from bilayer_core.simulation.gradients.nearby import Nearby
 Array = np.ndarray
 STEP = 1e-3
 """h of a parameter, over its size, and the largest displacement over it, of the longest rod."""
-_GAIN = re.compile(r".*\.eigenstrain(\.\d+)?\.gain(\.value\.\d+)?")
+GAIN = re.compile(r".*\.eigenstrain(\.\d+)?\.gain(\.value\.\d+)?")
+"""Paths of gains."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ def laws_of(model: Model, model_of: Callable[[SceneConfig], Model], numbers: Seq
     """Return which laws each gain among some numbers is that of, shape (n,), by its path, where nothing else of the
     model depends on it.
     """
-    gains = [(path, value) for path, value in numbers if _GAIN.fullmatch(path)]
+    gains = [(path, value) for path, value in numbers if GAIN.fullmatch(path)]
     if not gains:
         return {}
     changed = {path: value + STEP * (1.0 + k / len(gains)) * scale_of(value) for k, (path, value) in enumerate(gains)}

@@ -124,7 +124,8 @@ def _simulate(job: Job, point: Point, row: Row, begin: float, log: Path | None) 
     observers = [] if log is None else [_recorder(simulator, log)]
     recording = recording_of(job, simulator)
     try:
-        ended = simulator.run(observers=observers, interrupted=lambda: wall_time() > deadline)
+        over = {"observers": observers, "interrupted": lambda: wall_time() > deadline}
+        ended = simulator.run(**over, gradients=bool(job.slope_of))
     finally:
         if recording is not None:
             recording.stop()
@@ -133,6 +134,10 @@ def _simulate(job: Job, point: Point, row: Row, begin: float, log: Path | None) 
         row.summary = {key: value for key, value in summary.items() if key not in LEFT_OUT}
     if ended.termination is Termination.COMPLETED:
         row.metrics = measure(job, FinishedRun(simulator, summary, job.in_si(point.parameters), recording))
+        if job.slope_of:
+            from bilayer_core.studies.sweeps.ascent import slopes_of  # only for searches by derivatives
+
+            row.slopes, row.reason = slopes_of(job, simulator, ended)
     else:
         row.outcome = Outcome.OVER_TIME
         row.reason = f"took longer than {job.wall_time:g} s; it was at t = {simulator.time:g} s of the scene"

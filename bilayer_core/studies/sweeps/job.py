@@ -80,6 +80,8 @@ class Job:
         That a run may take [s].
     expected : dict
         Versions by name, which those of who runs must be.
+    slope_of : str
+        Metric whose derivatives by the parameters a search asks for; empty for none.
     """
 
     scene: str
@@ -94,6 +96,7 @@ class Job:
     directory: str
     wall_time: float | None
     expected: dict[str, str]
+    slope_of: str = ""
 
     @cached_property
     def scene_hash(self) -> str:
@@ -148,6 +151,8 @@ class Row:
         Of the steps and of all of it [s].
     log : str
         Name of its log below the directory of results; empty without one.
+    slopes : dict
+        Derivatives of `Job.slope_of` by the parameters, in their units; empty if there are none.
     """
 
     number: int
@@ -163,6 +168,7 @@ class Row:
     cpu_time: float = 0.0
     wall_time: float = 0.0
     log: str = ""
+    slopes: dict[str, float] = field(default_factory=dict)
 
     def columns(self) -> dict[str, Any]:
         """Return one value for each column: varied parameters, metrics, and the rest except the summary.
@@ -172,7 +178,7 @@ class Row:
         dict
         """
         rest = asdict(self)
-        for name in ("parameters", "metrics", "summary"):
+        for name in ("parameters", "metrics", "summary", "slopes"):
             del rest[name]
         rest["outcome"] = self.outcome.value
         return {"number": rest.pop("number"), **self.parameters, **self.metrics, **rest}

@@ -16,6 +16,7 @@ from bilayer_core.jit.compile_all import ensure_compiled
 from bilayer_core.log.file.output_paths import write_text
 from bilayer_core.scene.loader import load_content, scene_content, scene_text
 from bilayer_core.simulation.simulator import Simulator
+from bilayer_core.studies.sweeps.ascent import Ascent, refuse_unclimbable
 from bilayer_core.studies.sweeps.dask_processes import Engine
 from bilayer_core.studies.sweeps.design import Values
 from bilayer_core.studies.sweeps.execute_runs import scene_of
@@ -150,14 +151,19 @@ class Search:
         else:
             self._study.tell(self._asked.pop(number), state=optuna.trial.TrialState.FAIL)
 
-    def ranked(self, rows: list[Row]) -> list[Row]:
-        """Return the runs that have a value, the best first."""
-        known = [row for row in rows if row.outcome is Outcome.DONE and _is_value(row.metrics.get(self.metric))]
-        return sorted(known, key=lambda row: float(row.metrics[self.metric]), reverse=self.largest)
+
+def ranked(rows: list[Row], metric: str, largest: bool) -> list[Row]:
+    """Return the runs that have a value, the best first."""
+    known = [row for row in rows if row.outcome is Outcome.DONE and _is_value(row.metrics.get(metric))]
+    return sorted(known, key=lambda row: float(row.metrics[metric]), reverse=largest)
 
 
 def _is_value(value: Any) -> TypeGuard[float]:
     return isinstance(value, int | float) and value == value
+
+
+METHODS = ("search", "gradients")
+"""How values are chosen: by Optuna, or by derivatives."""
 
 
 def start_of(sweep: Sweep) -> Values | None:
@@ -211,6 +217,7 @@ def optimise(
     metric: str,
     *,
     largest: bool = True,
+    method: str = METHODS[0],
     trials: int = TRIALS,
     seed: int = 0,
     out: str | Path | None = None,
@@ -231,6 +238,9 @@ def optimise(
         Sweep file, or its content; its design and `count` do not matter; `start` is where the search begins.
     metric : str
     largest : bool
+    method : str
+        ``search``: Optuna chooses the next values; ``gradients``: climbs along the derivatives of runs do, see
+        docs/sweeps.md.
     trials : int
         Runs, those that are resumed included.
     seed : int
@@ -252,16 +262,29 @@ def optimise(
     directory = None if out is None else Path(out)
     read = read_sweep(spec, directory, is_search=True)
     _refuse_unsearchable(read, metric)
+    climbs = method == "gradients"
+    if method not in METHODS:
+        raise InputError(f"method {method!r}: must be one of {', '.join(METHODS)}")
+    if climbs:
+        refuse_unclimbable(read, metric)
+        read = replace(read, job=replace(read.job, slope_of=metric))
     processes = Processes(workers, scheduler, security, dashboard)
-    content = read.content | {"search": [metric, largest, seed]}
+    content = read.content | {"search": [metric, largest, seed, *([method] if climbs else [])]}
     with Journal(directory, content, resume=resume, force=force) as journal, ExitStack() as stack:
         rows = {row.key: row for row in journal.rows()}
-        search = Search(read, metric, largest, seed, list(rows.values()))
+        search = (
+            Ascent(read, metric, largest, seed, start_of(read))
+            if climbs
+            else Search(read, metric, largest, seed, list(rows.values()))
+        )
         ensure_compiled()
         engine = stack.enter_context(open_engine(read.job, processes, read.spec.limits.memory))
         if tell is not None:
             tell(engine)
         _run_trials(search, engine, journal, rows, trials, progress)
+        if isinstance(search, Ascent) and search.is_lost:
+            told = f"no run has derivatives of {metric!r}: {search.found_none}"
+            raise InputError(f"the method gradients: {told}; choose the method search")
         optimum = _confirm(search, engine, list(rows.values()))
         if directory is not None:
             write_table(journal, set(rows), read.about, directory)
@@ -278,7 +301,7 @@ def _refuse_unsearchable(sweep: Sweep, metric: str) -> None:
 
 
 def _run_trials(
-    search: Search,
+    search: Search | Ascent,
     engine: Engine,
     journal: Journal,
     rows: dict[str, Row],
@@ -302,10 +325,10 @@ def _run_trials(
                 progress(row)
 
 
-def _confirm(search: Search, engine: Engine, rows: list[Row]) -> Optimum:
+def _confirm(search: Search | Ascent, engine: Engine, rows: list[Row]) -> Optimum:
     """Make the best runs again with finer steps, until one says the same."""
-    ranked = search.ranked(rows)
-    if not ranked:
+    best = ranked(rows, search.metric, search.largest)
+    if not best:
         raise InputError(
             f"metric {search.metric!r}: no run has a value of it; {len(rows)} runs were made, the first ended: "
             f"{rows[0].outcome.value} {rows[0].reason}".rstrip()
@@ -316,7 +339,7 @@ def _confirm(search: Search, engine: Engine, rows: list[Row]) -> Optimum:
         found = next((row.metrics[search.metric] for row in rows if row.key == key), None)
         start = float(found) if _is_value(found) else None
     optima = []
-    for row in ranked[:MOST_CANDIDATES]:
+    for row in best[:MOST_CANDIDATES]:
         value = _finer(search, engine, row)
         ends = tuple(name for name, of in search.sweep.spec.parameters.items() if of.is_end(row.parameters[name]))
         optima.append(Optimum(search.metric, row, value, start, len(rows), search.sweep.job.units, ends))
@@ -325,7 +348,7 @@ def _confirm(search: Search, engine: Engine, rows: list[Row]) -> Optimum:
     return optima[0]
 
 
-def _finer(search: Search, engine: Engine, row: Row) -> float | None:
+def _finer(search: Search | Ascent, engine: Engine, row: Row) -> float | None:
     point = Point(row.number, row.key, row.parameters)
     engine.submit([point], finer_job(search.sweep.job, row.parameters))
     while True:
@@ -346,7 +369,7 @@ def finer_job(job: Job, parameters: Values) -> Job:
         changes = {"solver.tolerance": tolerance, "solver.max_step": longest}
     else:
         changes = {"solver.dt": FINER_STEP * simulator.dt}
-    return replace(job, scene=json.dumps(scene_content(load_content(content, changes))), logs="none")
+    return replace(job, scene=json.dumps(scene_content(load_content(content, changes))), logs="none", slope_of="")
 
 
 def write_best(sweep: Sweep, row: Row, directory: Path) -> Path:

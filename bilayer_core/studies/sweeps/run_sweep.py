@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -138,8 +138,17 @@ def read_sweep(
     content |= {"the scene": job.scene_hash, "functions": digest(repr(sorted(codes.items(), key=str)))}
     found = Sweep(read, job, source, content)
     if run_code or not read.change:
-        _check(found)
+        _check(replace(found, spec=_tried(read)) if is_search else found)
     return found
+
+
+def _tried(spec: SweepSpec) -> SweepSpec:
+    """Return a sweep over the ranges of a search with no more runs than there may be."""
+    try:
+        count_of(spec)
+        return spec
+    except InputError:
+        return spec.model_copy(update={"design": "latin_hypercube", "samples": TRIED})
 
 
 def _find_codes(read: SweepSpec, directory: Path, source: str, run_code: bool) -> dict[str, Any]:
