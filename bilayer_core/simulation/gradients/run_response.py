@@ -58,6 +58,8 @@ DIFFERENTIATED = {
     "barrier",
     "rod barrier",
     "gyroscopic",
+    "joints",
+    "joint friction",
     *FOLLOWING,
 }
 """Forces through which runs are differentiated."""

@@ -36,6 +36,7 @@ from bilayer_core.scene.transduction import lagged
 from bilayer_core.simulation.gradients.body_rates import BodyRates
 from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.followed import FOLLOWING, Followed
+from bilayer_core.simulation.gradients.mechanism_rates import resistances, slopes_of_motions
 from bilayer_core.simulation.gradients.step_again import KeptStep, Lacking, Reached, StepAgain
 
 Array = np.ndarray
@@ -290,6 +291,7 @@ class StageRates:
     by_director: Entries | None = None  # ∂g by strains at the origin, by drag
     by_origin: Entries | None = None  # ∂g/∂Ȳ by the gyroscopic force, shape (size, size)
     bodies: BodyRates | None = None
+    resistance: Array | float = 0.0  # of motions of joints and guides, shape (n_strain, 1)
     momentum: tuple[Entries, Entries] | None = None  # of the fluid, by places at the end and by velocities
     way: tuple = ()  # of turns, by places at the start, at the first guess and at the end
     law_by_mode: Array = field(default_factory=lambda: np.zeros((0, 0)))
@@ -328,6 +330,7 @@ class StepRates:
         )
         self._follower = Followed(model, agains[0])
         self._moving = [n for n in (*FOLLOWING, "inertia", "damping") if n in model.forces]
+        self._resisted = "joint friction" in model.forces
         self._moduli = agains[0].problem.moduli.exists or agains[0].problem.flattening.exists
 
     def take(self, step: KeptStep) -> list[Reached]:
@@ -354,9 +357,12 @@ class StepRates:
     def _strains(self, again: StepAgain, at: Configuration) -> Strains:
         """Return ∂σ/∂q at a configuration, with the gradient there evaluated where strains are viscous."""
         constants, stage = self.constants, again.stage
-        if not constants.groups:
+        if not (constants.groups or self._resisted):
             return Strains(constants, again, at, None)
         data, rows, columns = [np.zeros(0)], [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)]
+        if self._resisted:
+            motions = slopes_of_motions(again, at)
+            data, rows, columns = [motions.value], [motions.row], [motions.column]
         again.evaluate(at)
         before, origin = again.sums.gradient.copy(), stage.origin_strain.copy()
         for group in constants.groups:
@@ -379,6 +385,8 @@ class StepRates:
         found = StageRates(stage.length, stage.momentum_length, self._strains(again, at), self._by_laws(again, at))
         if again.of_bodies.size:
             found.bodies = BodyRates(again, at, self.step.method.couplings[n, :n], again.turned[:n])
+        if self._resisted:
+            found.resistance = resistances(again)[:, None]
         if constants.in_space:
             self._turning(again, n, found)
             if found.bodies:
@@ -533,6 +541,7 @@ class StepRates:
                 reached += stage.lag[2][:, None] * acts.stimulus[n, constants.channel]
             change = -constants.masses @ (origin + stage.length * origin_speed)
             change = change / (stage.length * stage.momentum_length) - constants.dissipation @ origin / stage.length
+            change[constants.of_strains] -= stage.resistance * origin[constants.of_strains] / stage.length
             right = change[:size] + stage.strains.pull_back(change[constants.of_strains])
             if bodies:
                 right = bodies.gather(right)
@@ -628,6 +637,7 @@ class StepRates:
                 origin_speeds[n][fluid] -= right / stage.momentum_length
             of_mass = constants.masses @ change / (stage.length * stage.momentum_length)
             origins[n] -= of_mass + constants.dissipation @ change / stage.length
+            origins[n][constants.of_strains] -= stage.resistance * change[constants.of_strains] / stage.length
             origin_speeds[n] -= stage.length * of_mass
             reached = end.reached if n + 1 == count else np.zeros_like(end.reached)
             if len(stage.law_by_gain):
