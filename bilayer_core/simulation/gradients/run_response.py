@@ -65,7 +65,7 @@ DIFFERENTIATED = {
 """Forces through which runs are differentiated."""
 SEEDS = ("positions", "velocities")
 """By which a derivative comes back from the end of a run."""
-AT_END = ("strain_rate", "reached", "strain_push")
+AT_END = ("speed", "strain_rate", "reached", "strain_push")
 """Rates that a number changes by itself at the end of a step."""
 FORGETS = 1e6
 """Lengths of the rod by which a derivative by a number, times its size, moves it."""
@@ -88,6 +88,7 @@ class Direct:
     stimulus: Array
     gain: Array
     gradient: list[Array]
+    speed: Array
     strain_rate: Array
     reached: Array
     strain_push: Array
@@ -319,6 +320,7 @@ class RunResponse:
             none.stimulus[:, :, 0],
             none.gain[:, 0],
             [],
+            np.zeros(here.size),
             np.zeros(here.end_rates.size),
             np.zeros(here.transduction.size),
             np.zeros(here.end_rates.size + here.wet),
@@ -334,8 +336,8 @@ class RunResponse:
                 self._replayed(again, replace(step, start=self._fitted(again, step.start, rates)), reached)
                 for again, rates in zip(number.agains, own, strict=True)
             ]
-            *found.gradient, reached_by, rates, push = (slope(values, h) for values in zip(*seen, strict=True))
-            found.reached = reached_by
+            *found.gradient, held, reached_by, rates, push = (slope(values, h) for values in zip(*seen, strict=True))
+            found.speed[here.held], found.reached = held, reached_by
             if number.rates is None:
                 found.strain_rate, found.strain_push = rates, push
             else:
@@ -366,7 +368,8 @@ class RunResponse:
             push = (push - carry * step.start.strain_acceleration) / (1.0 - carry)
             if not step.method.history:
                 push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
-        return [*gradients, again.transduction.copy(), again.end_rates.copy(), np.concatenate([push, of_fluid])]
+        held = again.speeds_of_held.copy()
+        return [*gradients, held, again.transduction.copy(), again.end_rates.copy(), np.concatenate([push, of_fluid])]
 
     def _fitted(self, again: StepAgain, state: State, rates: tuple[Array, Array] | None) -> State:
         """Return a state that a model with another number takes: with what only such models have, prescribed bodies

@@ -166,6 +166,18 @@ class StepAgain(Evaluator):
         return self._work.end.strain_rate
 
     @property
+    def held(self) -> Array:
+        """Rows of unknowns of nodes that free bodies hold, shape (n_held, 3)."""
+        constrained = self.problem.constrained
+        return self.of_nodes[constrained.node[constrained.free >= 0]]
+
+    @property
+    def speeds_of_held(self) -> Array:
+        """Velocities of these at the end of the stage, likewise."""
+        constrained = self.problem.constrained
+        return self._work.end.velocity[constrained.node[constrained.free >= 0]]
+
+    @property
     def gained_momentum(self) -> Array:
         """Gain of the fluid's momentum over the stage, shape (wet,)."""
         gained = np.zeros(self.wet)
