@@ -21,6 +21,7 @@ import numpy as np
 from bilayer_core.engine.newton import SETTLED_WITHIN
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.model.model import Model
+from bilayer_core.model.records.parts import Drives
 from bilayer_core.model.state import PARTS, State
 from bilayer_core.observed.frame import Description
 from bilayer_core.simulation.gains import put_gains
@@ -35,7 +36,7 @@ from bilayer_core.simulation.gradients.nearby import (
     slope,
     values_of,
 )
-from bilayer_core.simulation.gradients.parameters import STEP, laws_of, numbers_of, scale_of, scene_with
+from bilayer_core.simulation.gradients.parameters import STEP, laws_of, numbers_of, scene_with
 from bilayer_core.simulation.gradients.step_again import KeptStep, Reached, StepAgain
 from bilayer_core.simulation.gradients.step_rates import Inputs, Rates, StepRates
 from bilayer_core.simulation.same_model import differing
@@ -123,6 +124,11 @@ class Number:
     agains: list[StepAgain] = field(default_factory=list)
     own: bool = False
     rates: list[tuple[Array, Array]] | None = None
+
+
+def _modes_of(drives: Drives) -> tuple[Array, Array, Array]:
+    """Return the channel and the time constants of each mode."""
+    return np.repeat(drives.field_channel, np.diff(drives.field_first)), drives.mode_rising, drives.mode_falling
 
 
 class RunResponse:
@@ -245,7 +251,7 @@ class RunResponse:
         return {name: [self._number(path, value, laws.get(path)) for path, value in of] for name, of in paths.items()}
 
     def _number(self, path: str, value: float, laws: Array | None) -> Number:
-        found = Number(path, value, scale_of(value))
+        found = Number(path, value, abs(value) or min(1.0, self._size * STEP / self._step))
         if laws is not None:
             found.laws = laws
             return found
@@ -299,11 +305,38 @@ class RunResponse:
         by_rotation = rate("body_rotation")[free] @ own.body_rotation[free].swapaxes(1, 2)  # [dφ]×
         place[here.of_bodies[:, 3:]] = np.stack([by_rotation[:, j, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1)
         speed[here.of_bodies[:, :3]] = rate("body_velocity")[free]
+        held = self.model.constrained  # nodes go with bodies: how they move against them is among what acts in steps
+        for node, holder, arm in zip(held.node, held.free, self._arms(own), strict=True):
+            if holder >= 0:
+                motion = place[here.of_bodies[holder]]
+                place[here.of_nodes[node]] = motion[:3] + np.cross(motion[3:], arm)
         momenta = [self._momenta(of, state) for of, state in zip(number.agains, states, strict=False)]
         if momenta and len(free):
             speed[here.of_bodies[:, 3:]] = slope(momenta, h)
         rates = rate("strain_rate") if number.rates is None else np.zeros(here.end_rates.size)
-        return self._rates.constants.moves @ place, speed, rates, rate("transduction")
+        alike = len(states[0].transduction) == len(own.transduction)
+        reached = rate("transduction") if alike else 0.0 * own.transduction
+        return self._rates.constants.moves @ place, speed, rates, reached
+
+    def _arms(self, state: State) -> Array:
+        """Return the arms of nodes that bodies hold, shape (n_held, 3)."""
+        held = self.model.constrained
+        return np.einsum("kij,kj->ki", state.body_rotation[held.body], held.position)
+
+    def _modes(self, model: Model) -> Array:
+        """Return the mode of this model for each of another, whose layers may be unlike: that with its time constants.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        own, other = ([*zip(*_modes_of(each.drives), strict=True)] for each in (self.model, model))
+        if len(own) == len(other):
+            return np.arange(len(own))
+        if not set(other) <= set(own):
+            raise InputError("gradient: a time constant that parts alike layers is not differentiated by")
+        return np.array([own.index(mode) for mode in other], dtype=np.int64)
 
     def _momenta(self, again: StepAgain, state: State) -> Array:
         """Return the angular momenta of free bodies, shape (n_free, 3)."""
@@ -337,7 +370,9 @@ class RunResponse:
                 for again, rates in zip(number.agains, own, strict=True)
             ]
             *found.gradient, held, reached_by, rates, push = (slope(values, h) for values in zip(*seen, strict=True))
-            found.speed[here.held], found.reached = held, reached_by
+            found.speed[here.held] = held
+            if len(reached_by) == len(found.reached):
+                found.reached = reached_by
             if number.rates is None:
                 found.strain_rate, found.strain_push = rates, push
             else:
@@ -381,6 +416,7 @@ class RunResponse:
             mine, part = getattr(fitted, name), getattr(state, name)
             if mine.shape == part.shape:
                 mine[...] = part
+        fitted.transduction[:] = state.transduction[self._modes(model)]
         if rates is not None:
             fitted.strain_rate[:] = rates[0]
             if self._history:
@@ -547,7 +583,7 @@ class RunResponse:
         state.spin += way * along.speed[self._here.of_edges, k]
         if number.rates is None:
             state.strain_rate += way * along.strain_rate[:, k]
-        state.transduction += way * along.reached[:, k]
+        state.transduction += way * along.reached[self._modes(model), k]
         gains = model.drives.law_gain.copy()
         try:
             if number.laws.size:
