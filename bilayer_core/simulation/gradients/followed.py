@@ -57,7 +57,6 @@ def _room_for(sliding: Sliding) -> FrozenChange:
     )
 
 
-
 class Followed:
     """Derivatives of the forces of a model that follow the configuration."""
 
@@ -162,9 +161,7 @@ class Followed:
         of_rods = surfaces.contact_point_body[sliding.first[which]] < 0
         return sliding.node[which[of_rods & (free[surfaces.body[sliding.surface[which]]] >= 0)]]
 
-    def _differences(
-        self, again: StepAgain, colour: Array, edge_colour: Array, friction: FrozenChange
-    ) -> Differences:
+    def _differences(self, again: StepAgain, colour: Array, edge_colour: Array, friction: FrozenChange) -> Differences:
         """Return arrays for differences by unknowns of these colours."""
         colours = max(COLOURS, int(colour.max()) + 1)
         rows = colours * len(self._ways) + (max(COLOURS, int(edge_colour.max()) + 1) if self._turns else 0)
