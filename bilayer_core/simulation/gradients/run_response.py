@@ -181,10 +181,8 @@ class RunResponse:
         reasons = [f"the force {name!r}" for name in others]
         if model.free_count and self._stepper.engine.methods[0].history:
             reasons.append("free bodies with an integrator that keeps derivatives")
-        if model.free_count and not {"viscosity", "added mass"}.isdisjoint(model.forces):
-            reasons.append("free bodies beside viscosity or added mass")
-        if len(model.joins.first):
-            reasons.append("closed rods")
+        if model.free_count and "added mass" in model.forces:
+            reasons.append("free bodies beside added mass")
         if "added mass" in model.forces and self._stepper.engine.problem.raised.exists:
             reasons.append("added mass of layers that are unlike")
         if any(

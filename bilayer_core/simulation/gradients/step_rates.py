@@ -196,18 +196,22 @@ class Constants:
     def _groups(self, again: StepAgain) -> list[list[tuple[int, Array]]]:
         """Return groups of viscous strains that share no unknown, each with the unknowns that it depends on."""
         strands, bonds = again.problem.strands, again.problem.bonds
-        edges, joints = strands.edge_count, len(strands.joint_a)
+        edges, constrained = strands.edge_count, again.problem.constrained
+        holder = {node: f for node, f in zip(constrained.node, constrained.free, strict=True) if f >= 0}
+        clamped = again.problem.bodies.free_index[constrained.clamp_edge_body]
 
-        def of(*which: int) -> Array:
+        def of(*which: int, more: Sequence[int] = ()) -> Array:
             inner = [e for e in which if e < edges]
-            nodes = {n for e in inner for n in (strands.edge_node[e], strands.edge_node[e] + 1)}
-            return np.concatenate([self.nodes[sorted(nodes)].ravel(), strands.edge_unknown[inner]]).astype(int)
+            nodes = {n for e in inner for n in (strands.edge_node[e], strands.edge_node[e] + 1)} | set(more)
+            bodies = {holder[n] for n in nodes if n in holder} | {clamped[e - edges] for e in which if e >= edges}
+            bodies = sorted(bodies - {-1})
+            parts = self.nodes[sorted(nodes - set(holder))], strands.edge_unknown[inner], again.of_bodies[bodies]
+            return np.concatenate([part.ravel() for part in parts]).astype(int)
 
         seen = [of(e) for e in range(edges)]
         seen += [of(a, b) for a, b in zip(strands.joint_a, strands.joint_b, strict=True) for _ in range(3)]
         for k in range(len(bonds.joint)):
-            own = of(strands.joint_a[bonds.joint[k]], strands.joint_b[bonds.joint[k]])
-            seen += [np.union1d(own, self.nodes[bonds.node[k]].ravel())] * 3
+            seen += [of(strands.joint_a[bonds.joint[k]], strands.joint_b[bonds.joint[k]], more=bonds.node[k])] * 3
         groups: list[list[tuple[int, Array]]] = []
         taken: list[set[int]] = []
         for k in np.flatnonzero(self.viscous > 0.0):
@@ -218,7 +222,6 @@ class Constants:
                 taken.append(set())
             groups[place].append((int(k), seen[k]))
             taken[place] |= own
-        assert joints == len(strands.joint_b)
         return groups
 
     def tangents(self, at: Configuration) -> sparse.csr_matrix:
@@ -364,12 +367,12 @@ class StepRates:
             motions = slopes_of_motions(again, at)
             data, rows, columns = [motions.value], [motions.row], [motions.column]
         again.evaluate(at)
-        before, origin = again.sums.gradient.copy(), stage.origin_strain.copy()
+        before, origin = again.whole_gradient(), stage.origin_strain.copy()
         for group in constants.groups:
             for k, _ in group:
                 stage.origin_strain[k] -= STRAIN
             again.evaluate(at)
-            change = again.sums.gradient - before
+            change = again.whole_gradient() - before
             stage.origin_strain[:] = origin
             for k, seen in group:
                 data.append(change[seen] * (stage.length / (STRAIN * constants.viscous[k])))
