@@ -43,7 +43,7 @@ class BodyRates:
     Attributes
     ----------
     slides : ndarray or None
-        ∂g by turns of R̃ and by ω̃ of friction on bodies, shape (n_free, 6, size).
+        ∂g by turns of R̃ and by ω̃, of friction and of moments on bodies, shape (n_free, 6, size).
     """
 
     def __init__(self, again: StepAgain, at: Configuration, couplings: Sequence[float], turned: Sequence[Array]):
@@ -93,6 +93,17 @@ class BodyRates:
 
     def _turns(self, of: Array) -> Array:
         return of[self.unknown[:, 3:]]
+
+    def add_slides(self, again: StepAgain, at: Configuration, slides: Array | None) -> None:
+        """Take what friction depends on turns of R̃ and on ω̃, and add what moments do (`forces.loads`)."""
+        self.slides, moments = slides, again.problem.moments
+        if slides is None and moments.exists:
+            self.slides = np.zeros((len(self.unknown), 6, again.size))
+        for f, moment in zip(moments.body, moments.present, strict=True):
+            turn = again.stage.predicted_body_rotation[f] @ at.body_rotation[f].T
+            for c in range(3):
+                change = 0.5 * cross_matrix(moment) @ cross_matrix(np.eye(3)[c]) @ turn
+                self.slides[f, c, self.unknown[f, 3:]] -= _axial(change)
 
     # places of what bodies hold
 
@@ -147,7 +158,7 @@ class BodyRates:
         guess[self.rows] = origin[x] + self.length * speed[x] + self._ahead @ ahead[self.free, :3]
 
     def push(self, ahead: Array, right: Array) -> None:
-        """Add what turns to where inertia takes bodies make of its moments, and they and ω̃ of friction on them."""
+        """Add what turns to where inertia takes bodies make of its moments, and they and ω̃ of friction and of other moments."""
         right[self.unknown[:, 3:]] -= self._of["k_before"] @ ahead[:, :3] / (self.length * self.momentum_length)
         if self.slides is not None:
             right += np.einsum("fcj,fcn->jn", self.slides, ahead)

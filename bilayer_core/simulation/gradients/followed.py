@@ -27,7 +27,7 @@ from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.step_again import Lacking, StepAgain
 
 Array = np.ndarray
-FOLLOWING = ("drag", "turning drag", "added mass", "followers", "friction", "rod friction")
+FOLLOWING = ("drag", "turning drag", "added mass", "followers", "moments", "friction", "rod friction")
 PRESSING = ("barrier", "rod barrier")
 """On which friction depends."""
 REACH = 2
@@ -61,7 +61,9 @@ class Followed:
     """Derivatives of the forces of a model that follow the configuration."""
 
     def __init__(self, model: Model, again: StepAgain):
-        self._forces = [name for name in FOLLOWING if name in model.forces]
+        moments = again.problem.moments
+        turning = moments.exists and moments.dead < len(moments.body)
+        self._forces = [name for name in FOLLOWING if name in model.forces and (turning or name != "moments")]
         self._otherwise = not set(self._forces) <= {"friction", "rod friction"}
         if not self._forces:
             return

@@ -398,7 +398,7 @@ class StepRates:
             self._add_followed(found, *followed[:2])
             found.by_director = followed[2]
         if found.bodies:
-            found.bodies.slides = followed[3]
+            found.bodies.add_slides(again, at, followed[3])
         if again.wet:
             velocity = (at.position - stage.origin_position) / stage.length
             found.momentum = self._follower.momentum(again, at, velocity)
