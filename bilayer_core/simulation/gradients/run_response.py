@@ -26,6 +26,7 @@ from bilayer_core.model.state import PARTS, State
 from bilayer_core.observed.frame import Description
 from bilayer_core.simulation.gains import put_gains
 from bilayer_core.simulation.gradients.course import Course
+from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
 from bilayer_core.simulation.gradients.followed import FOLLOWING
 from bilayer_core.simulation.gradients.nearby import (
     PLACES,
@@ -190,8 +191,6 @@ class RunResponse:
             for method in self._stepper.engine.methods
         ):
             reasons.append("an integrator whose steps end beyond their last stage")
-        if self.scene.start == SETTLE:
-            reasons.append("a start that settles")
         problem = self._stepper.engine.problem
         if problem.light.exists:
             reasons.append("light")
@@ -217,6 +216,10 @@ class RunResponse:
     def _begins_at_start(self) -> bool:
         """Return whether the run began at the start of its scene, which depends on the scene's numbers."""
         own, start = self._builders.state_of(self.model), self._course.start
+        if self.scene.start == SETTLE and start.time[0] == 0.0:
+            if any(part.any() for part in (start.velocity, start.spin, start.body_velocity, start.body_angular_velocity)):
+                raise InputError("gradient: a run is not differentiated through a start that settles and then moves")
+            return True
         parts = ("time", "position", "velocity", "director1", "spin", "transduction", "body_position", "body_rotation")
         return all(np.array_equal(getattr(own, part), getattr(start, part)) for part in parts)
 
@@ -282,10 +285,14 @@ class RunResponse:
         here = self._here
         place, speed = np.zeros(here.size), np.zeros(here.size)
         own = self._course.start
-        if not self._from_start or number.laws.size:
+        if self._from_start and self.scene.start == SETTLE:
+            h, states = self._settled(number)
+        elif self._from_start and not number.laws.size:
+            h, states = self._step * number.scale, [
+                self._builders.state_of(of.model) for of in number.agains or number.around
+            ]
+        else:
             return place, speed, 0.0 * own.strain_rate, 0.0 * own.transduction
-        h = self._step * number.scale
-        states = [self._builders.state_of(of.model) for of in number.agains or number.around]
 
         def rate(part: str) -> Array:
             return slope([getattr(state, part) for state in states], h)
@@ -315,6 +322,13 @@ class RunResponse:
         alike = len(states[0].transduction) == len(own.transduction)
         reached = rate("transduction") if alike else 0.0 * own.transduction
         return self._rates.constants.moves @ place, speed, rates, reached
+
+    def _settled(self, number: Number) -> tuple[float, list[State]]:
+        """Return a step of a number, and the equilibria from which runs begin with it at `PLACES`."""
+        rest = Equilibrium(self._stepper, self._course.start, self._builders, self._description)
+        response = rest.respond(rest.parameters([number.path])[number.path][0])
+        motions = [response.motion * (place * response.h) for place in PLACES]
+        return response.h, [near.moved(motion) for near, motion in zip(response.nearby, motions, strict=True)]
 
     def _arms(self, state: State) -> Array:
         """Return the arms of nodes that bodies hold, shape (n_held, 3)."""
