@@ -17,7 +17,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import sparse
 
-from bilayer_core.model.records.step import Configuration
+from bilayer_core.model.records.step import Configuration, Method
+from bilayer_core.model.state import State
 from bilayer_core.simulation.gradients.step_again import StepAgain, cross_matrix, left_jacobian, rotation_of
 
 Array = np.ndarray
@@ -49,6 +50,7 @@ class BodyRates:
     def __init__(self, again: StepAgain, at: Configuration, couplings: Sequence[float], turned: Sequence[Array]):
         problem, stage, point = again.problem, again.stage, again.point
         self.slides: Array | None = None
+        self._bodies = again.problem.bodies.body_of_free
         self.unknown, self.length, self.momentum_length = again.of_bodies, stage.length, stage.momentum_length
         constrained, h = problem.constrained, stage.length
         held = np.flatnonzero(constrained.free >= 0)
@@ -132,7 +134,35 @@ class BodyRates:
         moves = sparse.csr_matrix((np.ones(self.rows.size), where), shape=(size, size))
         return (sparse.diags(self.freed[:, 0]) + of_turns + moves).tocsr()
 
+    def keep(self, state: State, moments: Array, method: Method, length: float) -> None:
+        """Take how turns of the origin follow from those at the start of the step, from L and from its derivative M
+        there, which a history keeps; `moments` are those of inertia.
+
+        With x = c h ω + d h² ω̇ the origin is exp(x) R, and I ω = L, I ω̇ = M − ω × L.
+        """
+        c, d = method.along[0] * length, method.bend * length**2
+        self.history = np.zeros((len(self.unknown), 3, 9))
+        for f, own in enumerate(moments):
+            b = self._bodies[f]
+            rotation, spin = state.body_rotation[b], state.body_angular_velocity[b]
+            second = rotation @ own @ rotation.T
+            inertia = np.trace(second) * np.eye(3) - second
+            momentum, moment = inertia @ spin, state.body_moment[f] - np.cross(spin, inertia @ spin)
+            inverse = np.linalg.inv(inertia)
+            rate = inverse @ moment
+            by_turn, by_momentum, by_moment = (np.eye(3, 9, 3 * k) for k in range(3))
+            of_spin = inverse @ (by_momentum + cross_matrix(momentum) @ by_turn) - cross_matrix(spin) @ by_turn
+            of_moment = by_moment + cross_matrix(momentum) @ of_spin - cross_matrix(spin) @ by_momentum
+            of_rate = inverse @ (of_moment + cross_matrix(moment) @ by_turn) - cross_matrix(rate) @ by_turn
+            x = c * spin + d * rate
+            self.history[f] = left_jacobian(x) @ (c * of_spin + d * of_rate) + rotation_of(x) @ by_turn
+
     # forward
+
+    def turn_by_history(self, first: Array, speed: Array, push: Array, origin: Array) -> None:
+        """Write turns of the origin, from what a history keeps."""
+        kept = [self._turns(of) for of in (first, speed, push)]
+        origin[self.unknown[:, 3:]] = self.history @ np.concatenate(kept, axis=1)
 
     def turn_origin(self, first: Array, origin: Array, gained: Sequence[tuple[Array, Array]]) -> None:
         """Write turns of the origin, from those at the start of the step and at ends and origins of earlier stages."""
@@ -208,6 +238,14 @@ class BodyRates:
         np.add.at(rate, self.free, self._by_spin.swapaxes(1, 2) @ by)
         origin[turns] += of["p_turn"].swapaxes(1, 2) @ ahead + of["w_turn"].swapaxes(1, 2) @ rate
         speed[turns] += of["p_spin"].swapaxes(1, 2) @ ahead + of["w_spin"].swapaxes(1, 2) @ rate
+
+    def turn_by_history_back(self, first: Array, speed: Array, push: Array, origin: Array) -> None:
+        """Take derivatives by turns of the origin that follow from what a history keeps."""
+        turns = self.unknown[:, 3:]
+        pulled = self.history.swapaxes(1, 2) @ origin[turns]
+        origin[turns] = 0.0
+        for k, of in enumerate((first, speed, push)):
+            of[turns] += pulled[:, 3 * k : 3 * k + 3]
 
     def turn_origin_back(self, first: Array, origin: Array, ends: Sequence[Array], origins: Sequence[Array]) -> None:
         """Take derivatives by turns of the origin."""

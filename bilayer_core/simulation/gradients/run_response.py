@@ -67,7 +67,7 @@ DIFFERENTIATED = {
 """Forces through which runs are differentiated."""
 SEEDS = ("positions", "velocities")
 """By which a derivative comes back from the end of a run."""
-AT_END = ("speed", "strain_rate", "reached", "strain_push")
+AT_END = ("speed", "push", "strain_rate", "reached", "strain_push")
 """Rates that a number changes by itself at the end of a step."""
 FORGETS = 1e6
 """Lengths of the rod by which a derivative by a number, times its size, moves it."""
@@ -91,6 +91,7 @@ class Direct:
     gain: Array
     gradient: list[Array]
     speed: Array
+    push: Array
     strain_rate: Array
     reached: Array
     strain_push: Array
@@ -180,8 +181,6 @@ class RunResponse:
         model = self.model
         others = [name for name in model.forces if name not in DIFFERENTIATED]
         reasons = [f"the force {name!r}" for name in others]
-        if model.free_count and self._stepper.engine.methods[0].history:
-            reasons.append("free bodies with an integrator that keeps derivatives")
         if model.free_count and "added mass" in model.forces:
             reasons.append("free bodies beside added mass")
         if "added mass" in model.forces and self._stepper.engine.problem.raised.exists:
@@ -366,6 +365,7 @@ class RunResponse:
             none.gain[:, 0],
             [],
             np.zeros(here.size),
+            np.zeros(here.size),
             np.zeros(here.end_rates.size),
             np.zeros(here.transduction.size),
             np.zeros(here.end_rates.size + here.wet),
@@ -382,7 +382,9 @@ class RunResponse:
                 for again, rates in zip(number.agains, own, strict=True)
             ]
             *found.gradient, held, reached_by, rates, push = (slope(values, h) for values in zip(*seen, strict=True))
-            found.speed[here.held] = held
+            found.speed[here.held] = held[0]
+            if self._history:
+                found.push[here.held] = held[1] / (1.0 - step.method.carry)
             if len(reached_by) == len(found.reached):
                 found.reached = reached_by
             if number.rates is None:
@@ -415,7 +417,7 @@ class RunResponse:
             push = (push - carry * step.start.strain_acceleration) / (1.0 - carry)
             if not step.method.history:
                 push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
-        held = again.speeds_of_held.copy()
+        held = again.speeds_of_held
         return [*gradients, held, again.transduction.copy(), again.end_rates.copy(), np.concatenate([push, of_fluid])]
 
     def _fitted(self, again: StepAgain, state: State, rates: tuple[Array, Array] | None) -> State:

@@ -173,9 +173,10 @@ class StepAgain(Evaluator):
 
     @property
     def speeds_of_held(self) -> Array:
-        """Velocities of these at the end of the stage, likewise."""
-        constrained = self.problem.constrained
-        return self._work.end.velocity[constrained.node[constrained.free >= 0]]
+        """Velocities of these at the end of the stage, and what they gain by its length, shape (2, n_held, 3)."""
+        constrained, work = self.problem.constrained, self._work
+        gained = (work.end.velocity - work.origin.velocity) / self.stage.momentum_length
+        return np.stack([work.end.velocity, gained])[:, constrained.node[constrained.free >= 0]]
 
     @property
     def gained_momentum(self) -> Array:
