@@ -181,8 +181,6 @@ class RunResponse:
         model = self.model
         others = [name for name in model.forces if name not in DIFFERENTIATED]
         reasons = [f"the force {name!r}" for name in others]
-        if model.free_count and "added mass" in model.forces:
-            reasons.append("free bodies beside added mass")
         if "added mass" in model.forces and self._stepper.engine.problem.raised.exists:
             reasons.append("added mass of layers that are unlike")
         if any(

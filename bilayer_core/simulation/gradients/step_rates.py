@@ -552,11 +552,11 @@ class StepRates:
             change = change / (stage.length * stage.momentum_length) - constants.dissipation @ origin / stage.length
             change[constants.of_strains] -= stage.resistance * origin[constants.of_strains] / stage.length
             right = change[:size] + stage.strains.pull_back(change[constants.of_strains])
+            if stage.momentum:
+                right -= origin_speed[fluid] / stage.momentum_length
             if bodies:
                 right = bodies.gather(right)
                 bodies.push(ahead, right)
-            if stage.momentum:
-                right -= origin_speed[fluid] / stage.momentum_length
             if len(stage.law_by_gain):
                 laws = stage.law_by_mode @ reached + stage.law_by_gain[:, None] * acts.gain
                 right += stage.by_laws @ laws
@@ -643,7 +643,7 @@ class StepRates:
             if bodies:
                 ahead += bodies.push_back(right)
             if stage.momentum:
-                origin_speeds[n][fluid] -= right / stage.momentum_length
+                origin_speeds[n][fluid] -= spread / stage.momentum_length
             of_mass = constants.masses @ change / (stage.length * stage.momentum_length)
             origins[n] -= of_mass + constants.dissipation @ change / stage.length
             origins[n][constants.of_strains] -= stage.resistance * change[constants.of_strains] / stage.length
