@@ -12,13 +12,16 @@ rotation vectors, θ of earlier ones from their origins, as in `engine.stages`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from scipy import sparse
 
+from bilayer_core.forces.body_drag import BodyFlow
 from bilayer_core.model.records.step import Configuration, Method
 from bilayer_core.model.state import State
+from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.step_again import StepAgain, cross_matrix, left_jacobian, rotation_of
 
 Array = np.ndarray
@@ -26,6 +29,19 @@ Array = np.ndarray
 
 def _axial(a: Array) -> Array:
     return np.array([a[2, 1] - a[1, 2], a[0, 2] - a[2, 0], a[1, 0] - a[0, 1]])
+
+
+def drag_by_origin(flow: BodyFlow, again: StepAgain, at: Configuration) -> Entries:
+    """Return how the drag of bodies depends on where they were at the origin of a stage, shape (size, size)."""
+    stage, size, blocks, rows = again.stage, again.size, [], []
+    for f, coefficient in zip(flow.free, flow.coefficient, strict=True):
+        v = (at.body_position[f] - stage.origin_body_position[f]) / stage.length - flow.velocity
+        speed = math.sqrt(float(v @ v))
+        along = np.outer(v, v) / speed if speed > 0.0 else np.zeros((3, 3))
+        blocks.append(-coefficient / stage.length * (speed * np.eye(3) + along))
+        rows.append(again.of_bodies[f, :3])
+    row = np.repeat(np.array(rows)[:, :, None], 3, axis=2)
+    return Entries(row.ravel(), row.swapaxes(1, 2).ravel(), np.array(blocks).ravel(), (size, size))
 
 
 class BodyRates:

@@ -60,6 +60,7 @@ DIFFERENTIATED = {
     "barrier",
     "rod barrier",
     "gyroscopic",
+    "body drag",
     "joints",
     "joint friction",
     *FOLLOWING,

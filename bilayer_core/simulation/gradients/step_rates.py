@@ -29,11 +29,12 @@ import numpy as np
 from scipy import sparse
 
 from bilayer_core.engine.steps_again import Differences
+from bilayer_core.forces.body_drag import body_flow_of
 from bilayer_core.forces.friction_change import FrozenChange
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.scene.transduction import lagged
-from bilayer_core.simulation.gradients.body_rates import BodyRates
+from bilayer_core.simulation.gradients.body_rates import BodyRates, drag_by_origin
 from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.followed import FOLLOWING, Followed
 from bilayer_core.simulation.gradients.mechanism_rates import resistances, slopes_of_motions
@@ -333,6 +334,7 @@ class StepRates:
         )
         self._follower = Followed(model, agains[0])
         self._moving = [n for n in (*FOLLOWING, "inertia", "damping") if n in model.forces]
+        self._body_flow = body_flow_of(model)
         self._resisted = "joint friction" in model.forces
         self._moduli = agains[0].problem.moduli.exists or agains[0].problem.flattening.exists
 
@@ -400,6 +402,9 @@ class StepRates:
         if followed[0] is not None:
             self._add_followed(found, *followed[:2])
             found.by_director = followed[2]
+        if self._body_flow.exists:
+            drag = drag_by_origin(self._body_flow, again, at)
+            found.by_origin = drag if found.by_origin is None else found.by_origin + drag
         if found.bodies:
             found.bodies.add_slides(again, at, followed[3])
         if again.wet:
