@@ -194,8 +194,6 @@ class RunResponse:
             reasons.append("light")
         if problem.varied_fields.exists:
             reasons.append("diffusion that varies with what it brings")
-        if "flattening" in model.forces and "viscosity" in model.forces:
-            reasons.append("viscosity of strips")
         if reasons:
             raise InputError(f"gradient: a run is not differentiated through {', '.join(reasons)}")
 

@@ -27,6 +27,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse import linalg
 
 from bilayer_core.engine.steps_again import Differences
 from bilayer_core.forces.body_drag import body_flow_of
@@ -132,7 +133,10 @@ class Constants:
         self.damping = problem.damping
         self.masses = self._masses(again)
         self.viscous = self._viscous(again)
-        drag = sparse.diags(np.concatenate([np.zeros(self.size), self.viscous, np.zeros(again.wet)]))
+        resisted = sparse.diags(self.viscous) + self._coupling(again)
+        others = (sparse.csr_matrix((of, of)) for of in (self.size, again.wet))
+        drag = sparse.block_diag([next(others), resisted, next(others)])
+        self.apart = self._inverse(resisted.tocsc())
         damped = np.ones(self.masses.shape[0])
         damped[again.of_bodies] = 0.0
         self.dissipation = (self.damping * sparse.diags(damped) @ self.masses + drag).tocsr()
@@ -194,6 +198,34 @@ class Constants:
             found[: len(elements)] = elements
         return found
 
+    def _coupling(self, again: StepAgain) -> sparse.csr_matrix:
+        """Return what viscosity of strips has beside the squares of strains; see `flattening.viscous_coupling`."""
+        problem, found = again.problem, sparse.lil_matrix((self.strains, self.strains))
+        strands, flattening, off_axis = problem.strands, problem.flattening, problem.off_axis
+        bent = {int(k): slope for k, slope in zip(off_axis.joint, off_axis.slope, strict=True)}
+        self.bending: dict[int, list[int]] = {}  # joints that the strain of an edge bends
+        if not (problem.viscosity.exists and flattening.exists):
+            return found.tocsr()
+        for k, coupling in zip(flattening.joint, flattening.coupling, strict=True):
+            lag, turn = coupling * problem.viscosity.joint_time[k, 0], strands.edge_count + 3 * k + 2
+            parts = [(turn - 2, 1.0)]
+            for e, slope in zip((strands.joint_a[k], strands.joint_b[k]), bent.get(int(k), ()), strict=False):
+                if slope != 0.0:
+                    parts.append((e, slope * strands.rest_length[e]))
+                    self.bending.setdefault(int(e), []).append(int(k))
+            for row, weight in parts if lag != 0.0 else ():
+                found[row, turn] += lag * weight
+                found[turn, row] += lag * weight
+        return found.tocsr()
+
+    def _inverse(self, resisted: sparse.csc_matrix) -> sparse.csr_matrix:
+        """Return the inverse for strains that are viscous, and nothing for others."""
+        which = np.flatnonzero(self.viscous > 0.0)
+        chosen = sparse.csr_matrix((np.ones(len(which)), (which, np.arange(len(which)))), (self.strains, len(which)))
+        if not len(which):
+            return sparse.csr_matrix((self.strains, self.strains))
+        return (chosen @ linalg.inv(resisted[which][:, which].tocsc()) @ chosen.T).tocsr()
+
     def _groups(self, again: StepAgain) -> list[list[tuple[int, Array]]]:
         """Return groups of viscous strains that share no unknown, each with the unknowns that it depends on."""
         strands, bonds = again.problem.strands, again.problem.bonds
@@ -202,14 +234,15 @@ class Constants:
         clamped = again.problem.bodies.free_index[constrained.clamp_edge_body]
 
         def of(*which: int, more: Sequence[int] = ()) -> Array:
-            inner = [e for e in which if e < edges]
+            inner = sorted({e for e in which if e < edges})
             nodes = {n for e in inner for n in (strands.edge_node[e], strands.edge_node[e] + 1)} | set(more)
             bodies = {holder[n] for n in nodes if n in holder} | {clamped[e - edges] for e in which if e >= edges}
             bodies = sorted(bodies - {-1})
             parts = self.nodes[sorted(nodes - set(holder))], strands.edge_unknown[inner], again.of_bodies[bodies]
             return np.concatenate([part.ravel() for part in parts]).astype(int)
 
-        seen = [of(e) for e in range(edges)]
+        joints = strands.joint_a, strands.joint_b
+        seen = [of(e, *(joints[s][k] for k in self.bending.get(e, ()) for s in range(2))) for e in range(edges)]
         seen += [of(a, b) for a, b in zip(strands.joint_a, strands.joint_b, strict=True) for _ in range(3)]
         for k in range(len(bonds.joint)):
             seen += [of(strands.joint_a[bonds.joint[k]], strands.joint_b[bonds.joint[k]], more=bonds.node[k])] * 3
@@ -365,9 +398,6 @@ class StepRates:
         if not (constants.groups or self._resisted):
             return Strains(constants, again, at, None)
         data, rows, columns = [np.zeros(0)], [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)]
-        if self._resisted:
-            motions = slopes_of_motions(again, at)
-            data, rows, columns = [motions.value], [motions.row], [motions.column]
         again.evaluate(at)
         before, origin = again.whole_gradient(), stage.origin_strain.copy()
         for group in constants.groups:
@@ -377,13 +407,16 @@ class StepRates:
             change = again.whole_gradient() - before
             stage.origin_strain[:] = origin
             for k, seen in group:
-                data.append(change[seen] * (stage.length / (STRAIN * constants.viscous[k])))
+                data.append(change[seen] * (stage.length / STRAIN))
                 rows.append(np.full(len(seen), k))
                 columns.append(seen)
         again.evaluate(at)
         where = np.concatenate(rows), np.concatenate(columns)
         shape = (constants.strains, constants.size)
-        return Strains(constants, again, at, sparse.csr_matrix((np.concatenate(data), where), shape=shape))
+        slopes = constants.apart @ sparse.csr_matrix((np.concatenate(data), where), shape=shape)
+        if self._resisted:
+            slopes = slopes + slopes_of_motions(again, at).matrix()
+        return Strains(constants, again, at, slopes)
 
     def _rates(self, again: StepAgain, n: int, followed: Lacking) -> StageRates:
         constants, stage, at = self.constants, again.stage, again.places[n + 1]
