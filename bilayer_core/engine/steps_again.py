@@ -390,14 +390,14 @@ def differentiate_friction(p, differences, at, trial, stage, h):
                 _move_origin(p, stage, side)
             else:
                 _move_pose(p, stage, of_body // 9, of_body % 9, side * h)
-            if spread:
+            if spread or of_body >= 0:
                 freeze_surface_contacts(sliding, p, at, stage)
             add_frozen(sliding, p, at, stage, side / (2.0 * h), change)
             if of_body < 0:
                 _move_origin(p, stage, -side)
             else:
                 _move_pose(p, stage, of_body // 9, of_body % 9, -side * h)
-        if spread:
+        if spread or of_body >= 0:
             freeze_surface_contacts(sliding, p, at, stage)
         if of_body < 0:
             _add_friction_change(p, differences, at, stage, by_origin, row)

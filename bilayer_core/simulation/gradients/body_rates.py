@@ -12,11 +12,15 @@ rotation vectors, θ of earlier ones from their origins, as in `engine.stages`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from bilayer_core.model.records.step import Configuration
+from bilayer_core.forces.body_drag import BodyFlow
+from bilayer_core.model.records.step import Configuration, Method
+from bilayer_core.model.state import State
+from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.step_again import (
     StepAgain,
     cross_matrices,
@@ -30,6 +34,19 @@ Array = np.ndarray
 
 def _axial(a: Array) -> Array:
     return np.array([a[2, 1] - a[1, 2], a[0, 2] - a[2, 0], a[1, 0] - a[0, 1]])
+
+
+def drag_by_origin(flow: BodyFlow, again: StepAgain, at: Configuration) -> Entries:
+    """Return how the drag of bodies depends on where they were at the origin of a stage, shape (size, size)."""
+    stage, size, blocks, rows = again.stage, again.size, [], []
+    for f, coefficient in zip(flow.free, flow.coefficient, strict=True):
+        v = (at.body_position[f] - stage.origin_body_position[f]) / stage.length - flow.velocity
+        speed = math.sqrt(float(v @ v))
+        along = np.outer(v, v) / speed if speed > 0.0 else np.zeros((3, 3))
+        blocks.append(-coefficient / stage.length * (speed * np.eye(3) + along))
+        rows.append(again.of_bodies[f, :3])
+    row = np.repeat(np.array(rows)[:, :, None], 3, axis=2)
+    return Entries(row.ravel(), row.swapaxes(1, 2).ravel(), np.array(blocks).ravel(), (size, size))
 
 
 class BodyRates:
@@ -48,12 +65,13 @@ class BodyRates:
     Attributes
     ----------
     slides : ndarray or None
-        ∂g by turns of R̃ and by ω̃ of friction on bodies, shape (n_free, 6, size).
+        ∂g by turns of R̃ and by ω̃, of friction and of moments on bodies, shape (n_free, 6, size).
     """
 
     def __init__(self, again: StepAgain, at: Configuration, couplings: Sequence[float], turned: Sequence[Array]):
         problem, stage, point = again.problem, again.stage, again.point
         self.slides: Array | None = None
+        self._bodies = again.problem.bodies.body_of_free
         self.unknown, self.length, self.momentum_length = again.of_bodies, stage.length, stage.momentum_length
         constrained, h = problem.constrained, stage.length
         held = np.flatnonzero(constrained.free >= 0)
@@ -99,6 +117,21 @@ class BodyRates:
     def _turns(self, of: Array) -> Array:
         return of[self.unknown[:, 3:]]
 
+    def add_slides(self, again: StepAgain, at: Configuration, slides: Array | None) -> None:
+        """Take how friction, by forces on all nodes, depends on turns of R̃ and on ω̃, shape (n_free, 6, size), and add
+        what moments do (`forces.loads`).
+        """
+        moments, size = again.problem.moments, again.size
+        if slides is not None:
+            self.slides = self.gather(slides.reshape(-1, size).T).T.reshape(-1, 6, size)
+        elif moments.exists:
+            self.slides = np.zeros((len(self.unknown), 6, size))
+        for f, moment in zip(moments.body, moments.present, strict=True):
+            turn = again.stage.predicted_body_rotation[f] @ at.body_rotation[f].T
+            for c in range(3):
+                change = 0.5 * cross_matrix(moment) @ cross_matrix(np.eye(3)[c]) @ turn
+                self.slides[f, c, self.unknown[f, 3:]] -= _axial(change)
+
     # places of what bodies hold
 
     def spread(self, moved: Array) -> Array:
@@ -115,12 +148,35 @@ class BodyRates:
         np.add.at(found, self.unknown[self.free, 3:], np.cross(self.arm[:, :, None], on, axis=1))
         return found
 
-    def slide(self, slides: Array) -> None:
-        """Take ∂g by turns of R̃ and by ω̃ of friction on bodies, with forces on all nodes, shape (n_free, 6, size)."""
-        size = len(self.freed)
-        self.slides = self.gather(slides.reshape(-1, size).T).T.reshape(-1, 6, size)
+    def keep(self, state: State, moments: Array, method: Method, length: float) -> None:
+        """Take how turns of the origin follow from those at the start of the step, from L and from its derivative M
+        there, which a history keeps; `moments` are those of inertia.
+
+        With x = c h ω + d h² ω̇ the origin is exp(x) R, and I ω = L, I ω̇ = M − ω × L.
+        """
+        c, d = method.along[0] * length, method.bend * length**2
+        self.history = np.zeros((len(self.unknown), 3, 9))
+        for f, own in enumerate(moments):
+            b = self._bodies[f]
+            rotation, spin = state.body_rotation[b], state.body_angular_velocity[b]
+            second = rotation @ own @ rotation.T
+            inertia = np.trace(second) * np.eye(3) - second
+            momentum, moment = inertia @ spin, state.body_moment[f] - np.cross(spin, inertia @ spin)
+            inverse = np.linalg.inv(inertia)
+            rate = inverse @ moment
+            by_turn, by_momentum, by_moment = (np.eye(3, 9, 3 * k) for k in range(3))
+            of_spin = inverse @ (by_momentum + cross_matrix(momentum) @ by_turn) - cross_matrix(spin) @ by_turn
+            of_moment = by_moment + cross_matrix(momentum) @ of_spin - cross_matrix(spin) @ by_momentum
+            of_rate = inverse @ (of_moment + cross_matrix(moment) @ by_turn) - cross_matrix(rate) @ by_turn
+            x = c * spin + d * rate
+            self.history[f] = left_jacobian(x) @ (c * of_spin + d * of_rate) + rotation_of(x) @ by_turn
 
     # forward
+
+    def turn_by_history(self, first: Array, speed: Array, push: Array, origin: Array) -> None:
+        """Write turns of the origin, from what a history keeps."""
+        kept = [self._turns(of) for of in (first, speed, push)]
+        origin[self.unknown[:, 3:]] = self.history @ np.concatenate(kept, axis=1)
 
     def turn_origin(self, first: Array, origin: Array, gained: Sequence[tuple[Array, Array]]) -> None:
         """Write turns of the origin, from those at the start of the step and at ends and origins of earlier stages."""
@@ -146,7 +202,7 @@ class BodyRates:
         guess[self.rows] = origin[x] + self.length * speed[x] + self._ahead @ ahead[self.free, :3]
 
     def push(self, ahead: Array, right: Array) -> None:
-        """Add what turns to where inertia takes bodies make of its moments, and they and ω̃ of friction on them."""
+        """Add moments of inertia by turns to where it takes bodies, friction and other moments by these and by ω̃."""
         right[self.unknown[:, 3:]] -= self._of["k_before"] @ ahead[:, :3] / (self.length * self.momentum_length)
         if self.slides is not None:
             right += np.einsum("fcj,fcn->jn", self.slides, ahead)
@@ -196,6 +252,14 @@ class BodyRates:
         np.add.at(rate, self.free, self._by_spin.swapaxes(1, 2) @ by)
         origin[turns] += of["p_turn"].swapaxes(1, 2) @ ahead + of["w_turn"].swapaxes(1, 2) @ rate
         speed[turns] += of["p_spin"].swapaxes(1, 2) @ ahead + of["w_spin"].swapaxes(1, 2) @ rate
+
+    def turn_by_history_back(self, first: Array, speed: Array, push: Array, origin: Array) -> None:
+        """Take derivatives by turns of the origin that follow from what a history keeps."""
+        turns = self.unknown[:, 3:]
+        pulled = self.history.swapaxes(1, 2) @ origin[turns]
+        origin[turns] = 0.0
+        for k, of in enumerate((first, speed, push)):
+            of[turns] += pulled[:, 3 * k : 3 * k + 3]
 
     def turn_origin_back(self, first: Array, origin: Array, ends: Sequence[Array], origins: Sequence[Array]) -> None:
         """Take derivatives by turns of the origin."""

@@ -24,14 +24,14 @@ class Entries:
         ]
         return np.stack(parts, axis=1)
 
-    def __add__(self, other: Entries) -> Entries:
-        parts = (self.row, other.row), (self.column, other.column), (self.value, other.value)
-        return Entries(*(np.concatenate(of) for of in parts), self.shape)
-
     @property
     def T(self) -> Entries:  # noqa: N802 as arrays have it
         """The transpose."""
         return Entries(self.column, self.row, self.value, self.shape[::-1])
+
+    def __add__(self, other: Entries) -> Entries:
+        pairs = (self.row, other.row), (self.column, other.column), (self.value, other.value)
+        return Entries(*(np.concatenate(of) for of in pairs), self.shape)
 
     def beside(self, columns: Array, numbers: Array) -> Entries:
         """Return a matrix with some columns, shape (n, rows), beside its own."""

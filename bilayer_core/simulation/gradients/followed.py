@@ -27,7 +27,7 @@ from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.step_again import Lacking, StepAgain
 
 Array = np.ndarray
-FOLLOWING = ("drag", "turning drag", "added mass", "followers", "friction", "rod friction")
+FOLLOWING = ("drag", "turning drag", "added mass", "followers", "moments", "friction", "rod friction")
 PRESSING = ("barrier", "rod barrier")
 """On which friction depends."""
 REACH = 2
@@ -60,7 +60,9 @@ class Followed:
     """Derivatives of the forces of a model that follow the configuration."""
 
     def __init__(self, model: Model, again: StepAgain):
-        self._forces = [name for name in FOLLOWING if name in model.forces]
+        moments = again.problem.moments
+        turning = moments.exists and moments.dead < len(moments.body)
+        self._forces = [name for name in FOLLOWING if name in model.forces and (turning or name != "moments")]
         self._otherwise = not set(self._forces) <= {"friction", "rod friction"}
         if not self._forces:
             return
@@ -230,5 +232,6 @@ class Followed:
                 np.add.at(inertia, fluid.edge_node + end, halves)
         row, column = (np.broadcast_to(of, inertia.shape).ravel() for of in (nodes[:, :, None], nodes[:, None, :]))
         nothing = np.zeros(0, dtype=int), np.zeros(0, dtype=int)
-        by_place = self._entries(found.by_place[: len(found.by_origin)], self._count, nothing)
+        rods, bodies = len(found.by_origin), again.of_bodies.ravel()
+        by_place = self._entries(found.by_place[:rods], self._count, nothing).beside(found.by_place[rods:], bodies)
         return by_place, Entries(row, column, inertia.ravel(), (size, size))

@@ -11,18 +11,25 @@ step is counted along the way start → first guess → end, whose transport dep
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bilayer_core.engine.steps_again import StrainDifferences
+from bilayer_core.forces.body_drag import body_flow_of
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.scene.transduction import lagged
-from bilayer_core.simulation.gradients.body_rates import BodyRates
+from bilayer_core.simulation.gradients.body_rates import BodyRates, drag_by_origin
 from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.followed import FOLLOWING, Followed
+from bilayer_core.simulation.gradients.mechanism_rates import resistances, slopes_of_motions
 from bilayer_core.simulation.gradients.step_again import KeptStep, Lacking, StepAgain, cross_matrices
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 Array = np.ndarray
 STRAIN = 1e-3
@@ -69,6 +76,8 @@ class Constants:
         self.mass = (self.mass + of_fluid)[:, None]
         drag = np.concatenate([np.zeros(self.size), self.viscous, np.zeros(again.wet)])
         self.drag = (drag - damped * of_fluid)[:, None]
+        self.strips = self._strips(again)
+        self.apart = self._inverse() if len(self.strips.row) else None
         self.of_strains = slice(self.size, self.size + self.strains)
         self.of_fluid = slice(self.size + self.strains, self.whole)
         free, moves = np.ones((self.size, 1)), np.ones((self.size, 1))
@@ -109,7 +118,8 @@ class Constants:
 
     def dissipation(self, of: Array, masses: Array) -> Array:
         """Return 𝓓 times columns, from 𝓜 times these."""
-        return self.damped * masses + self.drag * of
+        found = self.damped * masses + self.drag * of
+        return found + self.strips @ of if self.apart is not None else found
 
     def _viscous(self, again: StepAgain) -> Array:
         """Return the stiffness of each strain times its retardation time."""
@@ -125,27 +135,64 @@ class Constants:
             found[: len(elements)] = elements
         return found
 
+    def _strips(self, again: StepAgain) -> Entries:
+        """Return what viscosity of strips has beside the squares of strains; see `flattening.viscous_coupling`."""
+        problem, found = again.problem, [(0, 0, 0.0)][:0]
+        strands, flattening, off_axis = problem.strands, problem.flattening, problem.off_axis
+        bent = {int(k): slope for k, slope in zip(off_axis.joint, off_axis.slope, strict=True)}
+        self.bending: dict[int, list[int]] = {}  # joints that the strain of an edge bends
+        viscous = problem.viscosity.exists and flattening.exists
+        for k, coupling in zip(flattening.joint, flattening.coupling, strict=True) if viscous else ():
+            lag, turn = coupling * problem.viscosity.joint_time[k, 0], strands.edge_count + 3 * k + 2
+            parts = [(turn - 2, 1.0)]
+            for e, slope in zip((strands.joint_a[k], strands.joint_b[k]), bent.get(int(k), ()), strict=False):
+                if slope != 0.0:
+                    parts.append((e, slope * strands.rest_length[e]))
+                    self.bending.setdefault(int(e), []).append(int(k))
+            for row, weight in parts if lag != 0.0 else ():
+                found += [(row, turn, lag * weight), (turn, row, lag * weight)]
+        row, column, value = np.array(found, dtype=float).reshape(-1, 3).T
+        whole = self.size + row.astype(np.int64), self.size + column.astype(np.int64)
+        return Entries(*whole, value.copy(), (self.whole, self.whole))
+
+    def _inverse(self) -> sparse.csr_matrix:
+        """Return the inverse of what resists strains, for those that are viscous, and nothing for others."""
+        from scipy import sparse
+        from scipy.sparse import linalg
+
+        strips, shape = self.strips, (self.strains, self.strains)
+        where = strips.row - self.size, strips.column - self.size
+        resisted = sparse.csc_matrix((strips.value, where), shape) + sparse.diags(self.viscous)
+        which = np.flatnonzero(self.viscous > 0.0)
+        chosen = sparse.csr_matrix((np.ones(len(which)), (which, np.arange(len(which)))), (self.strains, len(which)))
+        return (chosen @ linalg.inv(resisted.tocsc()[which][:, which].tocsc()) @ chosen.T).tocsr()
+
     def _colours(self, again: StepAgain) -> tuple[Array, int, tuple[Array, Array]]:
         """Return colours of viscous strains, −1 of others, such that those of one colour share no unknown, how many
         there are, and each strain with each unknown that it depends on.
         """
         strands, bonds = again.problem.strands, again.problem.bonds
-        edges = strands.edge_count
+        edges, constrained = strands.edge_count, again.problem.constrained
+        holder = {node: f for node, f in zip(constrained.node, constrained.free, strict=True) if f >= 0}
+        clamped = again.problem.bodies.free_index[constrained.clamp_edge_body]
 
-        def of(*which: int) -> Array:
-            inner = [e for e in which if e < edges]
-            nodes = {n for e in inner for n in (strands.edge_node[e], strands.edge_node[e] + 1)}
-            return np.concatenate([self.nodes[sorted(nodes)].ravel(), strands.edge_unknown[inner]]).astype(int)
+        def of(*which: int, more: Sequence[int] = ()) -> Array:
+            inner = sorted({e for e in which if e < edges})
+            nodes = {n for e in inner for n in (strands.edge_node[e], strands.edge_node[e] + 1)} | set(more)
+            bodies = {holder[n] for n in nodes if n in holder} | {clamped[e - edges] for e in which if e >= edges}
+            held = again.of_bodies[sorted(bodies - {-1})]
+            parts = self.nodes[sorted(nodes - set(holder))], strands.edge_unknown[inner], held
+            return np.concatenate([part.ravel() for part in parts]).astype(int)
 
         colour = np.full(self.strains, -1)
         viscous = np.flatnonzero(self.viscous > 0.0)
         if not len(viscous):
             return colour, 0, (viscous, viscous)
-        seen = [of(e) for e in range(edges)]
+        joints = strands.joint_a, strands.joint_b
+        seen = [of(e, *(joints[s][k] for k in self.bending.get(e, ()) for s in range(2))) for e in range(edges)]
         seen += [of(a, b) for a, b in zip(strands.joint_a, strands.joint_b, strict=True) for _ in range(3)]
         for k in range(len(bonds.joint)):
-            own = of(strands.joint_a[bonds.joint[k]], strands.joint_b[bonds.joint[k]])
-            seen += [np.union1d(own, self.nodes[bonds.node[k]].ravel())] * 3
+            seen += [of(strands.joint_a[bonds.joint[k]], strands.joint_b[bonds.joint[k]], more=bonds.node[k])] * 3
         taken: list[set[int]] = []
         for k in viscous:
             unknowns = set(seen[k].tolist())
@@ -155,6 +202,16 @@ class Constants:
             taken[colour[k]] |= unknowns
         which = np.repeat(viscous, [len(seen[k]) for k in viscous])
         return colour, len(taken), (which, np.concatenate([seen[k] for k in viscous]))
+
+    def strains_of(self, row: Array, column: Array, force: Array) -> Entries:
+        """Return changes of strains that resist with some forces."""
+        shape = self.strains, self.size
+        if self.apart is None:
+            return Entries(row, column, force / self.viscous[row], shape)
+        from scipy import sparse
+
+        found = (self.apart @ sparse.csr_matrix((force, (row, column)), shape)).tocoo()
+        return Entries(found.row.astype(np.int64), found.col.astype(np.int64), found.data, shape)
 
     # the turns of edges, by vectors along which their transport depends on the nodes, shape (n_edge, 3)
 
@@ -224,6 +281,7 @@ class StageRates:
     by_director: Entries | None = None  # ∂g by strains at the origin, by drag
     by_origin: Entries | None = None  # ∂g/∂Ȳ by the gyroscopic force, shape (size, size)
     bodies: BodyRates | None = None
+    resistance: Array | float = 0.0  # of motions of joints and guides, shape (n_strain, 1)
     momentum: tuple[Entries, Entries] | None = None  # of the fluid, by places at the end and by velocities
     way: tuple[Array, ...] = ()  # of turns, by places at the start, at the first guess and at the end
     law_by_mode: Array = field(default_factory=lambda: np.zeros((0, 0)))
@@ -242,18 +300,21 @@ class StageDerivatives:
             by_strain=np.zeros((self.constants.colours, again.size)),
         )
         self.follower = Followed(model, again)
+        self._body_flow = body_flow_of(model)
+        self._resisted = "joint friction" in model.forces
         self._moving = [n for n in (*FOLLOWING, "inertia", "damping") if n in model.forces]
 
     def strains(self, again: StepAgain, at: Configuration) -> Strains:
         """Return ∂σ/∂q at a configuration."""
         constants = self.constants
-        if not constants.colours:
-            return Strains(constants, again, at, None)
-        again.differentiate_by_strains(at, self._differences, STRAIN)
-        which, seen = constants.seen
-        value = self._differences.by_strain[constants.colour[which], seen]
-        value *= -again.stage.length / constants.viscous[which]
-        return Strains(constants, again, at, Entries(which, seen, value, (constants.strains, constants.size)))
+        slopes = slopes_of_motions(again, at) if self._resisted else None
+        if constants.colours:
+            again.differentiate_by_strains(at, self._differences, STRAIN)
+            which, seen = constants.seen
+            value = -again.stage.length * self._differences.by_strain[constants.colour[which], seen]
+            own = constants.strains_of(which, seen, value)
+            slopes = own if slopes is None else own + slopes
+        return Strains(constants, again, at, slopes)
 
     def of(self, again: StepAgain, n: int, step: KeptStep, followed: Lacking) -> StageRates:
         """Return the maps of stage n of a step; what its Hessian lacks by forces that follow is known."""
@@ -261,13 +322,20 @@ class StageDerivatives:
         found = StageRates(stage.length, stage.momentum_length, self.strains(again, at), self._by_laws(again, at))
         if again.of_bodies.size:
             found.bodies = BodyRates(again, at, step.method.couplings[n, :n], again.turned[:n])
+            if step.method.history:
+                found.bodies.keep(step.start, again.problem.bodies.second_moment, step.method, step.length)
+        if self._resisted:
+            found.resistance = resistances(again)[:, None]
         if constants.in_space:
             self._turning(again, n, found)
         if followed[0] is not None:
             self._add_followed(found, *followed[:2])
             found.by_director = followed[2]
-            if found.bodies:
-                found.bodies.slide(followed[3])
+        if self._body_flow.exists:
+            drag = drag_by_origin(self._body_flow, again, at)
+            found.by_origin = drag if found.by_origin is None else found.by_origin + drag
+        if found.bodies:
+            found.bodies.add_slides(again, at, followed[3])
         if again.wet:
             velocity = (at.position - stage.origin_position) / stage.length
             found.momentum = self.follower.momentum(again, at, velocity)

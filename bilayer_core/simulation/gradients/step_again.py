@@ -182,6 +182,19 @@ class StepAgain(Evaluator):
         return self._work.end.strain_rate
 
     @property
+    def held(self) -> Array:
+        """Rows of unknowns of nodes that free bodies hold, shape (n_held, 3)."""
+        constrained = self.problem.constrained
+        return self.of_nodes[constrained.node[constrained.free >= 0]]
+
+    @property
+    def speeds_of_held(self) -> Array:
+        """Velocities of these at the end of the stage, and what they gain by its length, shape (2, n_held, 3)."""
+        constrained, work = self.problem.constrained, self._work
+        gained = (work.end.velocity - work.origin.velocity) / self.stage.momentum_length
+        return np.stack([work.end.velocity, gained])[:, constrained.node[constrained.free >= 0]]
+
+    @property
     def gained_momentum(self) -> Array:
         """Gain of the fluid's momentum over the stage, shape (wet,)."""
         gained = np.zeros(self.wet)

@@ -167,7 +167,10 @@ class StepRates:
                 origin += method.along[n] * h * speed + method.bend * h * h * push
                 origin_speed += method.momenta[n] * h * push
             if bodies := stage.bodies:
-                bodies.turn_origin(first, origin, turned)
+                if method.history:
+                    bodies.turn_by_history(first, speed, push, origin)
+                else:
+                    bodies.turn_origin(first, origin, turned)
                 ahead = bodies.predict(origin, origin_speed)
             reached = stage.lag[0][:, None] * start.reached
             if len(constants.channel):
@@ -176,6 +179,7 @@ class StepRates:
             of_mass = constants.masses(origin)
             change = -(of_mass + stage.length * constants.masses(origin_speed)) / stage.momentum_length
             change = (change - constants.dissipation(origin, of_mass)) / stage.length
+            change[constants.of_strains] -= stage.resistance * origin[constants.of_strains] / stage.length
             right = change[:size] + stage.strains.pull_back(change[constants.of_strains])
             if stage.momentum:
                 right -= origin_speed[fluid] / stage.momentum_length
@@ -269,11 +273,12 @@ class StepRates:
             if bodies:
                 ahead += bodies.push_back(right)
             if stage.momentum:
-                origin_speeds[n][fluid] -= right / stage.momentum_length
+                origin_speeds[n][fluid] -= spread / stage.momentum_length
             of_mass = constants.masses(change)
             drag = constants.dissipation(change, of_mass) / stage.length
             of_mass = of_mass / (stage.length * stage.momentum_length)
             origins[n] -= of_mass + drag
+            origins[n][constants.of_strains] -= stage.resistance * change[constants.of_strains] / stage.length
             origin_speeds[n] -= stage.length * of_mass
             reached = end.reached if n + 1 == count else np.zeros_like(end.reached)
             if len(stage.law_by_gain):
@@ -305,7 +310,10 @@ class StepRates:
                     start.place += of_start
             if bodies:
                 bodies.predict_back(origins[n], origin_speeds[n], ahead)
-                bodies.turn_origin_back(first, origins[n], ends, origins)
+                if method.history:
+                    bodies.turn_by_history_back(first, speed, push, origins[n])
+                else:
+                    bodies.turn_origin_back(first, origins[n], ends, origins)
             if method.history:
                 speed += method.along[n] * h * origins[n]
                 push += method.bend * h * h * origins[n] + method.momenta[n] * h * origin_speeds[n]
