@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import json
 import math
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.simulation.gradients.parameters import GAIN
-from bilayer_core.simulation.run_result import RunResult
 from bilayer_core.simulation.settling import SETTLE
-from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.studies.sweeps.design import Values, at
-from bilayer_core.studies.sweeps.job import Job, Outcome, Point, Row
+from bilayer_core.studies.sweeps.job import Outcome, Point, Row
 from bilayer_core.studies.sweeps.run_sweep import Sweep
+from bilayer_core.studies.sweeps.slopes import AXES
 from bilayer_core.studies.sweeps.spec import OfQuantity, Parameter
 
 STARTS = 5
@@ -25,7 +23,6 @@ FIRST, LONGER, SHORTER, LEAST = 0.3, 1.5, 0.1, 1e-3
 """Steps of a climb, as parts of ranges: the first, by what they grow and shrink at most, and where it stops."""
 MARGIN = 0.002
 """Part of its range that a value keeps from its ends, beyond which nothing can be differentiated."""
-AXES = ("com.x", "com.y", "com.z")
 
 
 def refuse_unclimbable(sweep: Sweep, metric: str) -> None:
@@ -47,31 +44,6 @@ def refuse_unclimbable(sweep: Sweep, metric: str) -> None:
                 f"{source} parameter {name!r} is neither a gain nor of a stimulus, so the start may depend on it; "
                 f"metric {metric!r} must be the last value"
             )
-
-
-def slopes_of(job: Job, simulator: Simulator, ended: RunResult) -> tuple[dict[str, float], str]:
-    """Return the derivatives of the metric that is searched for by the parameters, in their units, and why there are
-    none.
-
-    The mass centre is that of nodes; layers off the curve, which turn with it, are left out.
-    """
-    model, asks = simulator.model, job.metrics[job.slope_of]
-    assert isinstance(asks, OfQuantity), "the client has seen to it"
-    if model.free_count and model.robot_mass.any():
-        raise InputError("gradient: the mass centre of a robot with free bodies is not differentiated in searches")
-    mass, seeds = model.rods.node_mass, np.zeros((model.node_count, 3))
-    seeds[:, AXES.index(asks.quantity)] = mass / (mass.sum() + model.robot_mass.sum())
-    with warnings.catch_warnings(record=True) as told:
-        warnings.simplefilter("always")
-        by_path = ended.pull_back({"positions": seeds}, [path for paths in job.paths.values() for path in paths])
-    grown = [str(of.message) for of in told if "forgets its start" in str(of.message)]
-    if grown:
-        return {}, grown[0]
-    found = {}
-    for name, paths in job.paths.items():
-        unit = job.in_si({name: 1.0})[name] - job.in_si({name: 0.0})[name]
-        found[name] = unit * sum(float(by_path[path]) for path in paths)
-    return found, ""
 
 
 @dataclass

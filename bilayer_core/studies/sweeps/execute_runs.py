@@ -25,6 +25,7 @@ from bilayer_core.simulation.run_result import Termination
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.studies.sweeps.job import Job, Outcome, Point, Row
 from bilayer_core.studies.sweeps.metrics import FinishedRun, MetricError, measure, name_and_component, quantities_of
+from bilayer_core.studies.sweeps.slopes import slopes_of
 from bilayer_core.studies.sweeps.sweep_functions import load
 
 LOGS = "logs"
@@ -135,8 +136,6 @@ def _simulate(job: Job, point: Point, row: Row, begin: float, log: Path | None) 
     if ended.termination is Termination.COMPLETED:
         row.metrics = measure(job, FinishedRun(simulator, summary, job.in_si(point.parameters), recording))
         if job.slope_of:
-            from bilayer_core.studies.sweeps.ascent import slopes_of  # only for searches by derivatives
-
             row.slopes, row.reason = slopes_of(job, simulator, ended)
     else:
         row.outcome = Outcome.OVER_TIME
