@@ -150,14 +150,14 @@ class BodyRates:
         moves = sparse.csr_matrix((np.ones(self.rows.size), where), shape=(size, size))
         return (sparse.diags(self.freed[:, 0]) + of_turns + moves).tocsr()
 
-    def keep(self, state: State, moments: Array, method: Method, length: float) -> None:
-        """Take how turns of the origin follow from those at the start of the step, from L and from its derivative M
-        there, which a history keeps; `moments` are those of inertia.
+    def keep(self, state: State, moments: Array, method: Method, n: int, length: float) -> None:
+        """Take by what a history turns the origin of stage n: it depends on turns at the start of the step, on L and on
+        its derivative M there; `moments` are those of inertia.
 
-        With x = c h ω + d h² ω̇ the origin is exp(x) R, and I ω = L, I ω̇ = M − ω × L.
+        It turns by x = c h ω + d h² ω̇, with I ω = L and I ω̇ = M − ω × L.
         """
-        c, d = method.along[0] * length, method.bend * length**2
-        self.history = np.zeros((len(self.unknown), 3, 9))
+        c, d = method.along[n] * length, method.bend * length**2
+        self.history, self._beyond = np.zeros((len(self.unknown), 3, 9)), np.zeros((len(self.unknown), 3, 3))
         for f, own in enumerate(moments):
             b = self._bodies[f]
             rotation, spin = state.body_rotation[b], state.body_angular_velocity[b]
@@ -171,14 +171,14 @@ class BodyRates:
             of_moment = by_moment + cross_matrix(momentum) @ of_spin - cross_matrix(spin) @ by_momentum
             of_rate = inverse @ (of_moment + cross_matrix(moment) @ by_turn) - cross_matrix(rate) @ by_turn
             x = c * spin + d * rate
-            self.history[f] = left_jacobian(x) @ (c * of_spin + d * of_rate) + rotation_of(x) @ by_turn
+            self.history[f], self._beyond[f] = left_jacobian(x) @ (c * of_spin + d * of_rate), rotation_of(x)
 
     # forward
 
     def turn_by_history(self, first: Array, speed: Array, push: Array, origin: Array) -> None:
-        """Write turns of the origin, from what a history keeps."""
+        """Turn the origin on by what a history keeps."""
         kept = [self._turns(of) for of in (first, speed, push)]
-        origin[self.unknown[:, 3:]] = self.history @ np.concatenate(kept, axis=1)
+        origin[self.unknown[:, 3:]] = self._beyond @ self._turns(origin) + self.history @ np.concatenate(kept, axis=1)
 
     def turn_origin(self, first: Array, origin: Array, gained: Sequence[tuple[Array, Array]]) -> None:
         """Write turns of the origin, from those at the start of the step and at ends and origins of earlier stages."""
@@ -256,10 +256,10 @@ class BodyRates:
         speed[turns] += of["p_spin"].swapaxes(1, 2) @ ahead + of["w_spin"].swapaxes(1, 2) @ rate
 
     def turn_by_history_back(self, first: Array, speed: Array, push: Array, origin: Array) -> None:
-        """Take derivatives by turns of the origin that follow from what a history keeps."""
+        """Take derivatives by what a history keeps, and leave those by turns of the origin without it."""
         turns = self.unknown[:, 3:]
         pulled = self.history.swapaxes(1, 2) @ origin[turns]
-        origin[turns] = 0.0
+        origin[turns] = self._beyond.swapaxes(1, 2) @ origin[turns]
         for k, of in enumerate((first, speed, push)):
             of[turns] += pulled[:, 3 * k : 3 * k + 3]
 

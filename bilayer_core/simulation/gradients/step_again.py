@@ -341,12 +341,15 @@ class StepAgain(Evaluator):
         coupling = step.method.couplings[n + 1, n]
         turned = work.origin.angle + turned / coupling - work.start_angle - guess.total_angle
         shift = body - state.body_position[free] - self.stage.length * step.end.body_velocity[free]
+        along = step.method.along[n + 1] * h if step.method.history else 0.0
+        shift -= along * state.body_velocity[free]
         body = state.body_position[free] + work.origin.body_displacement[free] + shift / coupling
         first = self.places[0].body_rotation
         rotation = np.empty_like(first)
         for f, b in enumerate(free):
             whole = rotation_vector(step.end.body_rotation[b] @ first[f].T)
-            part = (whole - self.stage.length * step.end.body_angular_velocity[b]) / coupling
+            spin = self.stage.length * step.end.body_angular_velocity[b] + along * state.body_angular_velocity[b]
+            part = (whole - spin) / coupling
             rotation[f] = rotation_of(part) @ work.origin.rotation[b]
         return Reached(state.position + work.origin.displacement + moved / coupling, turned, body, rotation)
 

@@ -425,7 +425,7 @@ class StepRates:
             found.bodies = BodyRates(again, at, self.step.method.couplings[n, :n], again.turned[:n])
             if self.step.method.history:
                 second = again.problem.bodies.second_moment
-                found.bodies.keep(self.step.start, second, self.step.method, self.step.length)
+                found.bodies.keep(self.step.start, second, self.step.method, n, self.step.length)
         if self._resisted:
             found.resistance = resistances(again)[:, None]
         if constants.in_space:
@@ -577,10 +577,9 @@ class StepRates:
                 origin += method.along[n] * h * speed + method.bend * h * h * push
                 origin_speed += method.momenta[n] * h * push
             if bodies := stage.bodies:
+                bodies.turn_origin(first, origin, turned)
                 if method.history:
                     bodies.turn_by_history(first, speed, push, origin)
-                else:
-                    bodies.turn_origin(first, origin, turned)
                 ahead = bodies.predict(origin, origin_speed)
             reached = stage.lag[0][:, None] * start.reached
             if len(constants.channel):
@@ -718,8 +717,7 @@ class StepRates:
                 bodies.predict_back(origins[n], origin_speeds[n], ahead)
                 if method.history:
                     bodies.turn_by_history_back(first, speed, push, origins[n])
-                else:
-                    bodies.turn_origin_back(first, origins[n], ends, origins)
+                bodies.turn_origin_back(first, origins[n], ends, origins)
             if method.history:
                 speed += method.along[n] * h * origins[n]
                 push += method.bend * h * h * origins[n] + method.momenta[n] * h * origin_speeds[n]
