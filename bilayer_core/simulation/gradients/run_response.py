@@ -219,7 +219,9 @@ class RunResponse:
         """Return whether the run began at the start of its scene, which depends on the scene's numbers."""
         own, start = self._builders.state_of(self.model), self._course.start
         if self.scene.start == SETTLE and start.time[0] == 0.0:
-            if any(part.any() for part in (start.velocity, start.spin, start.body_velocity, start.body_angular_velocity)):
+            if any(
+                part.any() for part in (start.velocity, start.spin, start.body_velocity, start.body_angular_velocity)
+            ):
                 raise InputError("gradient: a run is not differentiated through a start that settles and then moves")
             return True
         parts = ("time", "position", "velocity", "director1", "spin", "transduction", "body_position", "body_rotation")
@@ -286,9 +288,10 @@ class RunResponse:
         if self._from_start and self.scene.start == SETTLE:
             h, states = self._settled(number)
         elif self._from_start and not number.laws.size:
-            h, states = self._step * number.scale, [
-                self._builders.state_of(of.model) for of in number.agains or number.around
-            ]
+            h, states = (
+                self._step * number.scale,
+                [self._builders.state_of(of.model) for of in number.agains or number.around],
+            )
         else:
             return place, speed, 0.0 * own.strain_rate, 0.0 * own.transduction
 
@@ -380,7 +383,9 @@ class RunResponse:
                 self._replayed(again, replace(step, start=self._fitted(again, step.start, rates)), reached)
                 for again, rates in zip(number.agains, own, strict=True)
             ]
-            *found.gradient, held, momenta, reached_by, rates, push = (slope(values, h) for values in zip(*seen, strict=True))
+            *found.gradient, held, momenta, reached_by, rates, push = (
+                slope(values, h) for values in zip(*seen, strict=True)
+            )
             for rows, (speed, gained) in ((here.held, held), (here.of_bodies[:, 3:], momenta)):
                 found.speed[rows] = speed
                 if self._history:
@@ -417,7 +422,14 @@ class RunResponse:
             push = (push - carry * step.start.strain_acceleration) / (1.0 - carry)
             if not step.method.history:
                 push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
-        return [*gradients, again.speeds_of_held, again.momenta_of_bodies, again.transduction.copy(), again.end_rates.copy(), np.concatenate([push, of_fluid])]
+        return [
+            *gradients,
+            again.speeds_of_held,
+            again.momenta_of_bodies,
+            again.transduction.copy(),
+            again.end_rates.copy(),
+            np.concatenate([push, of_fluid]),
+        ]
 
     def _fitted(self, again: StepAgain, state: State, rates: tuple[Array, Array] | None) -> State:
         """Return a state that a model with another number takes: with what only such models have, prescribed bodies
@@ -431,7 +443,9 @@ class RunResponse:
                 mine[...] = part
         fitted.transduction[:] = state.transduction[self._modes(model)]
         for f, b in enumerate(again.problem.bodies.body_of_free):
-            inertia = [_inertia(of.problem.bodies.second_moment[f], state.body_rotation[b]) for of in (self._here, again)]
+            inertia = [
+                _inertia(of.problem.bodies.second_moment[f], state.body_rotation[b]) for of in (self._here, again)
+            ]
             if not np.array_equal(*inertia):  # the momentum is kept
                 momentum = inertia[0] @ state.body_angular_velocity[b]
                 fitted.body_angular_velocity[b] = np.linalg.solve(inertia[1], momentum)
