@@ -204,7 +204,7 @@ class BodyRates:
         guess[self.rows] = origin[x] + self.length * speed[x] + self._ahead @ ahead[self.free, :3]
 
     def push(self, ahead: Array, right: Array) -> None:
-        """Add what turns to where inertia takes bodies make of its moments, and they and ω̃ of friction and of other moments."""
+        """Add what turns to where inertia takes bodies, and ω̃, make of moments of inertia, of friction and of loads."""
         right[self.unknown[:, 3:]] -= self._of["k_before"] @ ahead[:, :3] / (self.length * self.momentum_length)
         if self.slides is not None:
             right += np.einsum("fcj,fcn->jn", self.slides, ahead)
