@@ -198,9 +198,11 @@ def expect_end(p, start, end, method, work, n, h, first, guess, reached):
         b = bodies.body_of_free[f]
         for c in range(3):
             shift = end.body_position[b, c] - start.body_position[b, c] - length * end.body_velocity[b, c]
+            shift -= along * start.body_velocity[b, c]
             reached.body_position[f, c] = start.body_position[b, c] + origin.body_displacement[b, c] + shift / coupling
         v = rotation_vector_between(first.body_rotation, f, end.body_rotation, b)
-        v = combine(1.0 / coupling, v, -length / coupling, vector(end.body_angular_velocity, b))
+        v = combine(1.0, v, -length, vector(end.body_angular_velocity, b))
+        v = combine(1.0 / coupling, v, -along / coupling, vector(start.body_angular_velocity, b))
         rotate_by(v[0], v[1], v[2], origin.rotation, b, reached.body_rotation, f)
     return READY
 

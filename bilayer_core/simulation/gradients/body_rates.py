@@ -148,14 +148,14 @@ class BodyRates:
         np.add.at(found, self.unknown[self.free, 3:], np.cross(self.arm[:, :, None], on, axis=1))
         return found
 
-    def keep(self, state: State, moments: Array, method: Method, length: float) -> None:
-        """Take how turns of the origin follow from those at the start of the step, from L and from its derivative M
-        there, which a history keeps; `moments` are those of inertia.
+    def keep(self, state: State, moments: Array, method: Method, n: int, length: float) -> None:
+        """Take by what a history turns the origin of stage n: it depends on turns at the start of the step, on L and on
+        its derivative M there; `moments` are those of inertia.
 
-        With x = c h ω + d h² ω̇ the origin is exp(x) R, and I ω = L, I ω̇ = M − ω × L.
+        It turns by x = c h ω + d h² ω̇, with I ω = L and I ω̇ = M − ω × L.
         """
-        c, d = method.along[0] * length, method.bend * length**2
-        self.history = np.zeros((len(self.unknown), 3, 9))
+        c, d = method.along[n] * length, method.bend * length**2
+        self.history, self._beyond = np.zeros((len(self.unknown), 3, 9)), np.zeros((len(self.unknown), 3, 3))
         for f, own in enumerate(moments):
             b = self._bodies[f]
             rotation, spin = state.body_rotation[b], state.body_angular_velocity[b]
@@ -169,14 +169,14 @@ class BodyRates:
             of_moment = by_moment + cross_matrix(momentum) @ of_spin - cross_matrix(spin) @ by_momentum
             of_rate = inverse @ (of_moment + cross_matrix(moment) @ by_turn) - cross_matrix(rate) @ by_turn
             x = c * spin + d * rate
-            self.history[f] = left_jacobian(x) @ (c * of_spin + d * of_rate) + rotation_of(x) @ by_turn
+            self.history[f], self._beyond[f] = left_jacobian(x) @ (c * of_spin + d * of_rate), rotation_of(x)
 
     # forward
 
     def turn_by_history(self, first: Array, speed: Array, push: Array, origin: Array) -> None:
-        """Write turns of the origin, from what a history keeps."""
+        """Turn the origin on by what a history keeps."""
         kept = [self._turns(of) for of in (first, speed, push)]
-        origin[self.unknown[:, 3:]] = self.history @ np.concatenate(kept, axis=1)
+        origin[self.unknown[:, 3:]] = self._beyond @ self._turns(origin) + self.history @ np.concatenate(kept, axis=1)
 
     def turn_origin(self, first: Array, origin: Array, gained: Sequence[tuple[Array, Array]]) -> None:
         """Write turns of the origin, from those at the start of the step and at ends and origins of earlier stages."""
@@ -202,7 +202,7 @@ class BodyRates:
         guess[self.rows] = origin[x] + self.length * speed[x] + self._ahead @ ahead[self.free, :3]
 
     def push(self, ahead: Array, right: Array) -> None:
-        """Add moments of inertia by turns to where it takes bodies, friction and other moments by these and by ω̃."""
+        """Add what turns to where inertia takes bodies, and ω̃, make of moments of inertia, of friction and of loads."""
         right[self.unknown[:, 3:]] -= self._of["k_before"] @ ahead[:, :3] / (self.length * self.momentum_length)
         if self.slides is not None:
             right += np.einsum("fcj,fcn->jn", self.slides, ahead)
@@ -254,10 +254,10 @@ class BodyRates:
         speed[turns] += of["p_spin"].swapaxes(1, 2) @ ahead + of["w_spin"].swapaxes(1, 2) @ rate
 
     def turn_by_history_back(self, first: Array, speed: Array, push: Array, origin: Array) -> None:
-        """Take derivatives by turns of the origin that follow from what a history keeps."""
+        """Take derivatives by what a history keeps, and leave those by turns of the origin without it."""
         turns = self.unknown[:, 3:]
         pulled = self.history.swapaxes(1, 2) @ origin[turns]
-        origin[turns] = 0.0
+        origin[turns] = self._beyond.swapaxes(1, 2) @ origin[turns]
         for k, of in enumerate((first, speed, push)):
             of[turns] += pulled[:, 3 * k : 3 * k + 3]
 

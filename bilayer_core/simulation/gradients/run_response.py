@@ -132,6 +132,12 @@ class Number:
     rates: list[tuple[Array, Array]] | None = None
 
 
+def _inertia(second_moment: Array, rotation: Array) -> Array:
+    """Return the tensor of inertia of a turned body from its second moment."""
+    second = rotation @ second_moment @ rotation.T
+    return np.trace(second) * np.eye(3) - second
+
+
 def _modes_of(drives: Drives) -> tuple[Array, Array, Array]:
     """Return the channel and the time constants of each mode."""
     return np.repeat(drives.field_channel, np.diff(drives.field_first)), drives.mode_rising, drives.mode_falling
@@ -284,10 +290,6 @@ class RunResponse:
             if found.agains[0].end_rates.size != self._here.end_rates.size or not np.array_equal(*raised):
                 states = [self._builders.state_of(again.model) for again in found.agains]
                 found.rates = [(state.strain_rate, state.strain_acceleration) for state in states]
-        for again in found.agains:
-            own, others = self._here.problem, again.problem
-            if not np.array_equal(own.bodies.second_moment, others.bodies.second_moment):
-                raise InputError(f"gradient: {path} changes how free bodies turn, by which runs are not differentiated")
         if any(
             again.size != self._here.size or again.model.node_count != self.model.node_count for again in found.agains
         ):
@@ -401,10 +403,13 @@ class RunResponse:
                 self._replayed(again, replace(step, start=self._fitted(again, step.start, rates)), reached)
                 for again, rates in zip(number.agains, own, strict=True)
             ]
-            *found.gradient, held, reached_by, rates, push = (slope(values, h) for values in zip(*seen, strict=True))
-            found.speed[here.held] = held[0]
-            if self._history:
-                found.push[here.held] = held[1] / (1.0 - step.method.carry)
+            *found.gradient, held, momenta, reached_by, rates, push = (
+                slope(values, h) for values in zip(*seen, strict=True)
+            )
+            for rows, (speed, gained) in ((here.held, held), (here.of_bodies[:, 3:], momenta)):
+                found.speed[rows] = speed
+                if self._history:
+                    found.push[rows] = gained / (1.0 - step.method.carry)
             if len(reached_by) == len(found.reached):
                 found.reached = reached_by
             if number.rates is None:
@@ -429,8 +434,14 @@ class RunResponse:
             push = (push - carry * step.start.strain_acceleration) / (1.0 - carry)
             if not step.method.history:
                 push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
-        held = again.speeds_of_held
-        return [*gradients, held, again.transduction.copy(), again.end_rates.copy(), np.concatenate([push, of_fluid])]
+        return [
+            *gradients,
+            again.speeds_of_held,
+            again.momenta_of_bodies,
+            again.transduction.copy(),
+            again.end_rates.copy(),
+            np.concatenate([push, of_fluid]),
+        ]
 
     def _fitted(self, again: StepAgain, state: State, rates: tuple[Array, Array] | None) -> State:
         """Return a state that a model with another number takes: with what only such models have, prescribed bodies
@@ -443,6 +454,13 @@ class RunResponse:
             if mine.shape == part.shape:
                 mine[...] = part
         fitted.transduction[:] = state.transduction[self._modes(model)]
+        for f, b in enumerate(again.problem.bodies.body_of_free):
+            inertia = [
+                _inertia(of.problem.bodies.second_moment[f], state.body_rotation[b]) for of in (self._here, again)
+            ]
+            if not np.array_equal(*inertia):  # the momentum is kept
+                momentum = inertia[0] @ state.body_angular_velocity[b]
+                fitted.body_angular_velocity[b] = np.linalg.solve(inertia[1], momentum)
         if rates is not None:
             fitted.strain_rate[:] = rates[0]
             if self._history:
@@ -602,10 +620,10 @@ class RunResponse:
         for f, b in enumerate(evaluator.problem.bodies.body_of_free):
             of_body = evaluator.of_bodies[f]
             state.body_velocity[b] += way * along.speed[of_body[:3], k]
-            second = state.body_rotation[b] @ evaluator.problem.bodies.second_moment[f] @ state.body_rotation[b].T
-            if second.any():
+            inertia = _inertia(evaluator.problem.bodies.second_moment[f], state.body_rotation[b])
+            if inertia.any():
                 momentum = momenta[f] + way * along.speed[of_body[3:], k]
-                state.body_angular_velocity[b] = np.linalg.solve(np.trace(second) * np.eye(3) - second, momentum)
+                state.body_angular_velocity[b] = np.linalg.solve(inertia, momentum)
         state.velocity += way * along.speed[self._here.of_nodes, k]
         state.spin += way * along.speed[self._here.of_edges, k]
         if number.rates is None:

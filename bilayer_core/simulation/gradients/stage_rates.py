@@ -323,7 +323,7 @@ class StageDerivatives:
         if again.of_bodies.size:
             found.bodies = BodyRates(again, at, step.method.couplings[n, :n], again.turned[:n])
             if step.method.history:
-                found.bodies.keep(step.start, again.problem.bodies.second_moment, step.method, step.length)
+                found.bodies.keep(step.start, again.problem.bodies.second_moment, step.method, n, step.length)
         if self._resisted:
             found.resistance = resistances(again)[:, None]
         if constants.in_space:

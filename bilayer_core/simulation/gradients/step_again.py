@@ -195,6 +195,14 @@ class StepAgain(Evaluator):
         return np.stack([work.end.velocity, gained])[:, constrained.node[constrained.free >= 0]]
 
     @property
+    def momenta_of_bodies(self) -> Array:
+        """Angular momenta of free bodies at the end of the stage, and what they gain by its length, shape (2, n_free,
+        3).
+        """
+        end, origin = self._work.end.angular_momentum, self._work.origin.angular_momentum
+        return np.stack([end, (end - origin) / self.stage.momentum_length])
+
+    @property
     def gained_momentum(self) -> Array:
         """Gain of the fluid's momentum over the stage, shape (wet,)."""
         gained = np.zeros(self.wet)

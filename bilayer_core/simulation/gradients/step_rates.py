@@ -167,10 +167,9 @@ class StepRates:
                 origin += method.along[n] * h * speed + method.bend * h * h * push
                 origin_speed += method.momenta[n] * h * push
             if bodies := stage.bodies:
+                bodies.turn_origin(first, origin, turned)
                 if method.history:
                     bodies.turn_by_history(first, speed, push, origin)
-                else:
-                    bodies.turn_origin(first, origin, turned)
                 ahead = bodies.predict(origin, origin_speed)
             reached = stage.lag[0][:, None] * start.reached
             if len(constants.channel):
@@ -312,8 +311,7 @@ class StepRates:
                 bodies.predict_back(origins[n], origin_speeds[n], ahead)
                 if method.history:
                     bodies.turn_by_history_back(first, speed, push, origins[n])
-                else:
-                    bodies.turn_origin_back(first, origins[n], ends, origins)
+                bodies.turn_origin_back(first, origins[n], ends, origins)
             if method.history:
                 speed += method.along[n] * h * origins[n]
                 push += method.bend * h * h * origins[n] + method.momenta[n] * h * origin_speeds[n]
