@@ -113,11 +113,7 @@ class Course:
 
     def _made(self, span: _Span, end: Array, maker: Stepper) -> Iterator[KeptStep]:
         state = self._of(span.start)
-        place = 0
-        for name in FROM_OUTSIDE:
-            part = getattr(state, name)
-            part[...] = span.outside[place : place + part.size].reshape(part.shape)
-            place += part.size
+        _set_outside(state, span.outside)
         for k, (time, stood_in) in enumerate(zip(span.ends, span.stood_in, strict=True)):
             start = state.copy()
             if k + 1 == len(span.ends):
@@ -126,5 +122,20 @@ class Course:
                 maker.make_again(state, time, stood_in)
             yield KeptStep(start, state.copy(), self._method(stood_in))
 
+    def repeat(self, maker: Stepper, state: State) -> None:
+        """Make all steps from another state, with what was set from outside."""
+        for span in self._spans:
+            _set_outside(state, span.outside)
+            for time, stood_in in zip(span.ends, span.stood_in, strict=True):
+                maker.make_again(state, time, stood_in)
+
     def _method(self, stood_in: bool) -> Method:
         return self._stepper.engine.methods[-1 if stood_in else 0]
+
+
+def _set_outside(state: State, outside: Array) -> None:
+    place = 0
+    for name in FROM_OUTSIDE:
+        part = getattr(state, name)
+        part[...] = outside[place : place + part.size].reshape(part.shape)
+        place += part.size

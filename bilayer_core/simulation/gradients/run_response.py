@@ -158,7 +158,7 @@ class RunResponse:
         self._rates = StepRates(self.model, agains)
         self._here = agains[0]
         self._maker = builders.stepper_of(self.model)
-        self._from_start = self._begins_at_start()
+        self.from_start = self._begins_at_start()
 
     def _refuse(self) -> None:
         """Refuse what is not differentiated, by its name."""
@@ -270,7 +270,7 @@ class RunResponse:
         here = self._here
         place, speed = np.zeros(here.size), np.zeros(here.size)
         own = self._course.start
-        if not self._from_start or number.laws.size:
+        if not self.from_start or number.laws.size:
             return place, speed, 0.0 * own.strain_rate, 0.0 * own.transduction
         h = self._step * number.scale
         states = [self._builders.state_of(of.model) for of in number.agains or number.around]
