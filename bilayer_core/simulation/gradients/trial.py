@@ -1,4 +1,4 @@
-"""Whether a run goes where its derivatives say: its steps once more, with all numbers a little changed.
+"""Find whether a run goes where its derivatives say: its steps once more, with all numbers a little changed.
 
 Derivatives are exact for the steps that were made. But where each impact, or each change between sticking and slipping,
 makes two runs differ more, they are right for changes that nobody can make, and only a run tells.
@@ -13,7 +13,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from bilayer_core.errors import SceneError, SimulationError
-from bilayer_core.model.state import State
 from bilayer_core.observed.frame import Description
 from bilayer_core.scene.loader import load_content, scene_content
 from bilayer_core.simulation.gradients.course import Course
@@ -65,8 +64,8 @@ def try_derivatives(
         if not off[name] <= LIMIT:
             warnings.warn(
                 f"gradient: with {_told(found)} changed by {100.0 * PART / math.sqrt(len(found)):.2g} %, a run moves "
-                f"{name} by {sizes[1]:.3g}, where derivatives say {sizes[0]:.3g} ({100.0 * off[name]:.0f} % apart): it goes by "
-                "leaps, as after impacts or where friction sticks and slips; differentiate a shorter run",
+                f"{name} by {sizes[1]:.3g}, where derivatives say {sizes[0]:.3g} ({100.0 * off[name]:.0f} % apart): "
+                "it goes by leaps, as after impacts or where friction sticks and slips; differentiate a shorter run",
                 RuntimeWarning,
                 stacklevel=4,
             )
