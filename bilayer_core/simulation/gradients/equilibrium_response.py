@@ -36,6 +36,7 @@ from bilayer_core.simulation.gradients.nearby import (
     Nearby,
     carry_directors,
     known_quantities,
+    refuse_other_plane,
     slope,
 )
 from bilayer_core.simulation.gradients.parameters import (
@@ -223,6 +224,7 @@ class Equilibrium:
     def _with(self, path: str, value: float) -> Nearby:
         """Return the model with another number in its scene."""
         model = self._builders.model_of(scene_with(self.scene, path, value))
+        refuse_other_plane(self.model, model, path)
         stepper = self._builders.stepper_of(model)
         state = self._carried(model)
         if state is None:
@@ -324,7 +326,7 @@ class Equilibrium:
         for _ in range(MOST if moves else 0):
             shapes = [of.moved(motion * (place * h)) for of, place in zip(nearby, PLACES, strict=True)]
             correction = self._solved(slope([of.gradient(s) for of, s in zip(nearby, shapes, strict=True)], h))
-            part = self.displacement(correction) / self.displacement(motion)
+            part = h * self.displacement(correction) / travel
             if not part < before:
                 break
             motion, before = motion + correction, part

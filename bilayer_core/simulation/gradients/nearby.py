@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bilayer_core.engine.evaluator import Evaluator
+from bilayer_core.errors import InputError
 from bilayer_core.log.run.frame_values import FrameValues
 from bilayer_core.log.run.quantities import entries
 from bilayer_core.model.lit_elements import light_of, part_seen
@@ -30,6 +31,8 @@ LENGTH = 1e3
 """Over which inertia acts [s]: it keeps what nothing holds from drifting, and corrections take it out again."""
 PLACES = (-1.0, -0.5, 0.5, 1.0)
 """Of a step h of a parameter, where models are looked at: for differences of fourth order."""
+SAME_PLANE = 1e-12
+"""Difference of the normals of two planes that are one."""
 
 
 def slope(values: Sequence[Any], h: float) -> Any:
@@ -44,6 +47,15 @@ class Builders:
     model_of: Callable[[SceneConfig], Model]
     stepper_of: Callable[[Model], Stepper]
     state_of: Callable[[Model], State]
+
+
+def refuse_other_plane(model: Model, other: Model, path: str) -> None:
+    """Refuse a number that turns the plane of a model of dimension 2, in which its unknowns are."""
+    if model.plane.exists and not np.allclose(model.plane.normal, other.plane.normal, rtol=0.0, atol=SAME_PLANE):
+        raise InputError(
+            f"gradient: {path} turns the plane in which this model moves; allowed are numbers that keep it, or "
+            "`solver.dimension: 3`"
+        )
 
 
 def known_quantities(stepper: Stepper, state: State, description: Description) -> dict[str, Any]:

@@ -32,6 +32,7 @@ from bilayer_core.simulation.gradients.nearby import (
     carry_directors,
     described,
     known_quantities,
+    refuse_other_plane,
     slope,
     values_of,
 )
@@ -256,6 +257,7 @@ class RunResponse:
                 states = [self._builders.state_of(again.model) for again in found.agains]
                 found.rates = [(state.strain_rate, state.strain_acceleration) for state in states]
         for again in found.agains:
+            refuse_other_plane(self.model, again.model, path)
             own, others = self._here.problem, again.problem
             if not np.array_equal(own.bodies.second_moment, others.bodies.second_moment):
                 raise InputError(f"gradient: {path} changes how free bodies turn, by which runs are not differentiated")
