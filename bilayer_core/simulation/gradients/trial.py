@@ -21,9 +21,11 @@ from bilayer_core.simulation.gradients.run_response import Number, RunResponse
 
 Array = np.ndarray
 PART = 1e-2
-"""By which numbers are changed, over their size and the root of how many there are."""
+"""By which numbers are changed, over their size and the root of how many there are; zeros by its square."""
 LIMIT = 0.2
 """Difference between derivatives and the run, over the larger of both, that is told."""
+ROUNDED = 1e-9
+"""Changes of a quantity, over it, that tell nothing."""
 SEEN = 1e-2
 """A quantity is compared where it changes by so much of what it would, did all numbers act in one direction."""
 
@@ -47,7 +49,8 @@ def try_derivatives(
     ends = np.cumsum([0, *(slope.size for slope in found[0][1])])
     first = np.abs(each[: ends[1]]) @ scales
     signs = np.where(each[int(first.argmax())] < 0.0, -1.0, 1.0)
-    change = PART / math.sqrt(len(found)) * scales * signs
+    parts = np.array([PART if number.value else PART**2 for number, _ in found])
+    change = parts / math.sqrt(len(found)) * scales * signs
     for way in (1.0, -1.0):
         made = _run_with(run, course, builders, description, wanted, [number for number, _ in found], way * change)
         if made is not None:
@@ -55,25 +58,29 @@ def try_derivatives(
     else:
         return {}
     off = {}
-    for name, begin, end, moved in zip(wanted, ends[:-1], ends[1:], made, strict=True):
+    for name, begin, end, before, moved in zip(wanted, ends[:-1], ends[1:], *made, strict=True):
         told = way * each[begin:end] @ change
-        if np.linalg.norm(told) < SEEN * np.linalg.norm(np.abs(each[begin:end]) @ np.abs(change)):
+        sizes = float(np.linalg.norm(told)), float(np.linalg.norm(moved))
+        least = max(SEEN * np.linalg.norm(np.abs(each[begin:end]) @ np.abs(change)), ROUNDED * np.linalg.norm(before))
+        if max(sizes) <= least:
             continue
-        sizes = np.linalg.norm(told), np.linalg.norm(moved)
-        off[name] = float(np.linalg.norm(told - moved) / max(*sizes, np.finfo(float).tiny))
-        if not off[name] <= LIMIT:
+        off[name] = float(np.linalg.norm(told - moved)) / max(sizes)
+        if off[name] > LIMIT:
             warnings.warn(
-                f"gradient: with {_told(found)} changed by {100.0 * PART / math.sqrt(len(found)):.2g} %, a run moves "
-                f"{name} by {sizes[1]:.3g}, where derivatives say {sizes[0]:.3g} ({100.0 * off[name]:.0f} % apart): "
-                "it goes by leaps, as after impacts or where friction sticks and slips; differentiate a shorter run",
+                f"gradient: with {_told(found, way * change)}, a run moves {name} by {sizes[1]:.3g}, where derivatives "
+                f"say {sizes[0]:.3g} ({100.0 * off[name]:.0f} % apart): it goes by leaps, as after impacts or where "
+                "friction sticks and slips; differentiate a shorter run",
                 RuntimeWarning,
                 stacklevel=4,
             )
     return off
 
 
-def _told(found: Sequence[tuple[Number, list[Array]]]) -> str:
-    return found[0][0].path if len(found) == 1 else f"all {len(found)} numbers"
+def _told(found: Sequence[tuple[Number, list[Array]]], change: Array) -> str:
+    number = found[0][0]
+    if len(found) == 1:
+        return f"{number.path} at {number.value + change[0]:.6g} in place of {number.value:.6g}"
+    return f"all {len(found)} numbers changed by up to {100.0 * PART / math.sqrt(len(found)):.2g} %"
 
 
 def _run_with(
@@ -84,9 +91,9 @@ def _run_with(
     wanted: Sequence[str],
     numbers: Sequence[Number],
     change: Array,
-) -> list[Array] | None:
-    """Return by how much quantities change with the numbers at the end of a run; None where it cannot be begun, NaN
-    where it fails.
+) -> tuple[list[Array], list[Array]] | None:
+    """Return quantities at the end of a run, and by how much they change with the numbers; None where the other run
+    cannot be made.
     """
     other = {number.path: number.value + by for number, by in zip(numbers, change, strict=True)}
     try:
@@ -104,5 +111,5 @@ def _run_with(
         course.repeat(stepper, state)
         after = values_of(stepper, state, wanted, described(description, stepper))
     except SimulationError:
-        return [np.full(value.size, math.nan) for value in before]
-    return [(one - other).ravel() for one, other in zip(after, before, strict=True)]
+        return None
+    return before, [(one - other).ravel() for one, other in zip(after, before, strict=True)]
