@@ -284,6 +284,11 @@ class Engine:
         return self._counts.restarts > 0
 
     @property
+    def spread(self) -> np.ndarray:
+        """Places in `Work.spread` of the contacts that friction has spread in the last step."""
+        return np.flatnonzero(self._work.spread)
+
+    @property
     def unstable(self) -> int:
         """How many directions were found unstable when they were last counted."""
         return int(self._storage.problem.system.negative[0])

@@ -199,6 +199,8 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
         if status != CONVERGED:
             return _leave(p, status, -1, e)
         worst = max(worst, outcome.residual)
+        if work.spread.shape[1] > 0:
+            _keep_spread(p.sliding.spread, work.spread, n)
         solved = configuration_at(work.configurations[e])
         end_stage(p, state, work, inputs, n, solved)
         add_powers(p, work, inputs, n, method.works[1 + n] * h, solved)
@@ -243,6 +245,15 @@ def make_step(p, state, start_state, method, with_history, inputs, work, h, tole
     last = configuration_at(work.configurations[e])
     p.outcome.gains = close_step_account(p, state, work, h, ends > stages, last)
     return _leave(p, CONVERGED, -1, e)
+
+
+@kernel
+def _keep_spread(spread, out, n):
+    """Note which contacts friction has spread in stage n: what runs are differentiated through needs to know."""
+    nodes = spread.shape[1]
+    for s in range(spread.shape[0]):
+        for i in range(nodes):
+            out[n, s * nodes + i] = spread[s, i]
 
 
 @kernel

@@ -170,7 +170,7 @@ def _write_axis(sliding, surfaces, at, k, i, s, node, n):
 
 
 @kernel
-def _across(sliding, k, across_out):
+def write_across(sliding, k, across_out):
     """Write s = n × a."""
     n, a = sliding.normal, sliding.axis
     across_out[0] = n[k, 1] * a[k, 2] - n[k, 2] * a[k, 1]
@@ -179,7 +179,7 @@ def _across(sliding, k, across_out):
 
 
 @kernel
-def _slip(sliding, surfaces, strands, at, stage, k, arm_out, lever_out, slip_out):
+def contact_slip(sliding, surfaces, strands, at, stage, k, arm_out, lever_out, slip_out):
     """Write the slip of a contact since the origin of the stage [m], and its arms now on the body that the contact
     point is on (not written for a rod) and on that of the surface [m].
     """
@@ -223,7 +223,7 @@ def slip_paths(sliding, surfaces, strands, at, stage, system, path_out):
     for k in range(sliding.count[0]):
         i, node = sliding.first[k], sliding.node[k]
         body, under = surfaces.contact_point_body[i], surfaces.body[sliding.surface[k]]
-        _slip(sliding, surfaces, strands, at, stage, k, arm, lever, slip)
+        contact_slip(sliding, surfaces, strands, at, stage, k, arm, lever, slip)
         for c in range(3):
             rate[c] = 0.0 if body >= 0 else system.node_step[node, c]
         if body >= 0:
@@ -231,7 +231,7 @@ def slip_paths(sliding, surfaces, strands, at, stage, system, path_out):
         else:
             add_step_of_arm(surfaces, strands, node, k, sliding.arm_rate, system.node_step, system.angle_step, rate)
         _add_motion(system.motion, under, lever, -1.0, rate)
-        _across(sliding, k, s)
+        write_across(sliding, k, s)
         path_out[k, 0] = slip[0] * a[k, 0] + slip[1] * a[k, 1] + slip[2] * a[k, 2]
         path_out[k, 1] = rate[0] * a[k, 0] + rate[1] * a[k, 1] + rate[2] * a[k, 2]
         path_out[k, 2] = slip[0] * s[0] + slip[1] * s[1] + slip[2] * s[2]
@@ -264,8 +264,8 @@ def add_surface_friction(sliding, p, at, stage, with_hessian):
         if largest == 0.0:
             continue
         a, b = surfaces.contact_point_body[i], surfaces.body[sliding.surface[k]]
-        _slip(sliding, surfaces, p.strands, at, stage, k, arm, lever, u)
-        _across(sliding, k, across)
+        contact_slip(sliding, surfaces, p.strands, at, stage, k, arm, lever, u)
+        write_across(sliding, k, across)
         forward = u[0] * axis[k, 0] + u[1] * axis[k, 1] + u[2] * axis[k, 2]
         sideways = u[0] * across[0] + u[1] * across[1] + u[2] * across[2]
         ca = (mu[k, 0] if forward >= 0.0 else mu[k, 1]) ** 2
@@ -441,7 +441,7 @@ def _spread(sliding, p, at, stage, count):
         places = int(math.ceil(PARTS * half - ROUNDING))
         if count - whole + 2 * places > most:
             continue
-        _slip(sliding, surfaces, strands, at, stage, k, arm, lever, slip)
+        contact_slip(sliding, surfaces, strands, at, stage, k, arm, lever, slip)
         _project(sliding, k, slip)
         for side in range(-1, 2, 2):
             e = _edge_beside(surfaces, strands, i, c, side)

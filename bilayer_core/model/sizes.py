@@ -39,6 +39,7 @@ def sizes_of(model: Model) -> dict[str, int]:
         "contact_point": len(surfaces.weight),
         "point": len(surfaces.point_position),
         "surface": len(surfaces.kind),
+        "surface of node": len(surfaces.kind) * model.node_count if "friction" in model.forces else 0,
         "body": bodies,
         "body+world": bodies + 1,
         "free": model.free_count,

@@ -49,6 +49,23 @@ HEAVY = {"fluid.added_mass": True}
 FREE = {"type": "free", "mass": "2 g", "inertia": ["0.3 g cm^2", "0.5 g cm^2", "0.7 g cm^2"]}
 TURNING = SPACE | {"bodies.wall.motion": FREE | {"angular_velocity": [3.0, 5.0, -4.0]}}
 IN_WATER = SPACE | {"fluid": WATER}
+WALL = {"name": "wall", "position": [0, 0, 0], "motion": {"type": "prescribed"}}
+
+
+def bob(joint):
+    """Return what hangs a body by a joint from the end of the strip, which another body holds."""
+    tip = {"name": "tip", "position": [0.1, 0, 0], "motion": dict(FREE)}
+    hanging = {"name": "bob", "position": [0.11, 0, -0.02], "motion": dict(FREE)}
+    pivot = {"name": "pivot", "bodies": ["tip", "bob"], "point": [0.1, 0, 0]} | joint
+    of_scene = {"bodies": [WALL, tip, hanging], "joints": [pivot], "rods.strip.clamp_end": "tip"}
+    return HANGING | SPACE | of_scene | {"solver.integrator": "sdirk2"}
+
+
+HINGE = {"type": "hinge", "axis": [0, 1, 0], "turning": {"spring": 0.002, "damping": 1e-5, "friction": 1e-4}}
+SLIDING = {"spring": 10.0, "damping": 0.1}
+CYLINDER = {"type": "cylinder", "axis": [0.6, 0, 0.8], "turning": {"friction": 1e-4}}
+GUIDE = {"type": "guided", "axis": [0, 0, 1], "mass": 1e-3, "sliding": SLIDING}
+TURNED = "joints.pivot.turning"
 CASES = {
     "in a plane": ("bending", HANGING, 0.2, [GAIN, LEVEL, TIME, MODULUS, THICKNESS, "gravity.2", LENGTH]),
     "in space": ("bending", HANGING | SPACE, 0.2, [GAIN, MODULUS, LENGTH]),
@@ -65,6 +82,16 @@ CASES = {
     "fibres in space": ("chiral_pod", {}, 0.02, ["gravity.2"]),
     "drag in a plane": ("flagellum", STILL_WATER, 0.05, ["fluid.density", "materials.film.youngs_modulus"]),
     "drag in space": ("bending", HANGING | IN_WATER, 0.1, [GAIN, "fluid.density"]),
+    "a pin between bodies": ("bending", bob({"type": "pin"}), 0.03, [LENGTH, "bodies.tip.position.2"]),
+    "a hinge that resists": ("bending", bob(HINGE), 0.05, [GAIN, f"{TURNED}.spring", "joints.pivot.point.0"]),
+    "a hinge that rubs": ("bending", bob(HINGE), 0.05, [f"{TURNED}.friction", "bodies.bob.motion.mass"]),
+    "a cylinder in space": (
+        "bending",
+        bob(CYLINDER | {"sliding": SLIDING | {"friction": 0.02}}),
+        0.03,
+        [GAIN, "gravity.2"],
+    ),
+    "a rail": ("bending", HANGING | {"bodies.wall.motion": GUIDE}, 0.05, [GAIN, "bodies.wall.motion.sliding.spring"]),
     "drag of turns": (
         "bending",
         SPACE | {"fluid": WATER, "loads": [JET]},
@@ -72,10 +99,21 @@ CASES = {
         ["loads.0.force.2", "fluid.velocity.1"],
     ),
 }
+STEPS_OF_1_MS = EULER | {"solver.dt": 0.001}
+STRIDE, CLOSE = {"stimuli.humidity.schedule.period": 0.4}, {"stimuli.humidity.schedule.end": 0.05}
+PUSHED = {"bodies.ball.motion.velocity": [0.05, 0.02, 0]}
+ALIKE = STRIDE | STEPS_OF_1_MS | {"contact.friction": {"coefficient": 0.6, "speed_threshold": 1e-4}}
+GRIP = CLOSE | STEPS_OF_1_MS | {"stimuli.humidity.schedule.start": 0}
+BALL, FOOT, COEFFICIENT = "body/ball/position", "rod/hind_foot/position", "contact.friction.coefficient"
+GAIN_OF_ARMS, GAIN_OF_TRUNK = (f"rods.{rod}.layers.active.eigenstrain.gain" for rod in ("arm", "trunk"))
 RUBBING = {
-    "a crawler": ("crawling_inchworm", {}, 0.05, [f"{BODY}.eigenstrain.gain", "contact.friction.forward"]),
-    "rods in space": ("knot", {}, 0.005, ["materials.rubber.density"]),
-    "a jumper": ("jumping", {}, 0.03, ["gravity.2"]),
+    "a crawler": ("crawling_inchworm", {}, 0.05, [f"{BODY}.eigenstrain.gain", "contact.friction.forward"], "com"),
+    "rods in space": ("knot", {}, 0.005, ["materials.rubber.density"], "com"),
+    "a jumper": ("jumping", {}, 0.03, ["gravity.2"], "com"),
+    "a ball that rolls": ("gripping", PUSHED, 0.03, [COEFFICIENT, "bodies.ball.motion.velocity.0"], BALL),
+    "a ball that is gripped": ("gripping", GRIP, 0.055, ["gravity.2", GAIN_OF_ARMS], BALL),
+    "a walker": ("crawling_dual_leg", STRIDE, 0.002, ["gravity.2", "contact.friction.backward"], FOOT),
+    "a walker on a place that slides": ("crawling_dual_leg", ALIKE, 0.005, [COEFFICIENT, GAIN_OF_TRUNK], "com"),
 }
 STEPS = {LENGTH: 1e-5}
 """Differences of second order have their least errors with these, else with 1e-4."""
@@ -115,12 +153,12 @@ def test_gradients_of_runs_through_contact_agree_to_1e_4(to):
 
 @pytest.mark.parametrize("case", RUBBING)
 def test_gradients_of_runs_through_settled_friction_agree_to_1e_4(case):
-    name, overrides, duration, to = RUBBING[case]
+    name, overrides, duration, to, of = RUBBING[case]
     simulator, result = kept_run(name, overrides, duration)
-    found = result.gradient("com", to)
+    found = result.gradient(of, to)
     for path in to:
-        (other,) = differences_of_runs(name, overrides, result.differentiable.made, path, 1e-5, ["com"])
-        assert error(found["com", path], other) < 1e-4, path
+        (other,) = differences_of_runs(name, overrides, result.differentiable.made, path, 1e-5, [of])
+        assert error(found[of, path], other) < 1e-4, path
 
 
 def test_differences_of_runs_over_a_ladder_of_steps_reach_a_plateau_at_the_gradient():
@@ -142,6 +180,9 @@ BACK = {
     "generalised alpha": ("bending", HANGING | ALPHA | VISCOUS, 0.1, [GAIN, MODULUS]),
     "contact": ("bending", ON_A_POST, 0.2, [LEVEL, "obstacles.post.radius"]),
     "friction": ("jumping", {}, 0.03, ["gravity.2"]),
+    "friction on bodies": ("crawling_dual_leg", ALIKE, 0.002, ["gravity.2", COEFFICIENT]),
+    "a grip": ("gripping", GRIP, 0.052, [COEFFICIENT, GAIN_OF_ARMS]),
+    "a hinge that rubs": ("bending", bob(HINGE), 0.05, [GAIN, f"{TURNED}.friction"]),
     "a body that turns": ("bending", HANGING | TURNING, 0.05, [GAIN, "gravity.2"]),
     "added mass": ("flagellum", {}, 0.05, ["fluid.density"]),
     "drag of turns": ("bending", IN_WATER | {"loads": [JET]}, 0.1, ["fluid.density"]),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bilayer_core.jit.record import CHANGES, Indices, Matrix, Stack, Tensor, Vector, record
+from bilayer_core.jit.record import CHANGES, FlagTable, Indices, Matrix, Stack, Tensor, Vector, record
 
 IN_MOTION, AT_REST, LOOKED_AT = 0.0, 1.0, 2.0
 """What displacements in a stage are: motion; none, where rest is looked for; motion whose stability is looked at."""
@@ -204,6 +204,7 @@ class Work:
     mean_force: Vector = ("law",)  # likewise at the start and at stages, by their weights [J s]
     end_force: Vector = ("law",)  # and at its end
     rates: Matrix = ("body+world", 6)  # of bodies at the end of a stage [m/s, rad/s]
+    spread: FlagTable = ("stage", "surface of node")  # `Sliding.spread` where each stage ended
     account: StepAccount
 
 

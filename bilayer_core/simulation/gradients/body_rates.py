@@ -39,10 +39,16 @@ class BodyRates:
         Of earlier stages.
     turned : sequence of ndarray
         Rotation vectors from their origins, shapes (n_free, 3).
+
+    Attributes
+    ----------
+    slides : ndarray or None
+        ∂g by turns of R̃ and by ω̃, of friction and of moments on bodies, shape (n_free, 6, size).
     """
 
     def __init__(self, again: StepAgain, at: Configuration, couplings: Sequence[float], turned: Sequence[Array]):
         problem, stage, point = again.problem, again.stage, again.point
+        self.slides: Array | None = None
         self.unknown, self.length, self.momentum_length = again.of_bodies, stage.length, stage.momentum_length
         constrained, h = problem.constrained, stage.length
         held = np.flatnonzero(constrained.free >= 0)
@@ -88,6 +94,17 @@ class BodyRates:
     def _turns(self, of: Array) -> Array:
         return of[self.unknown[:, 3:]]
 
+    def add_slides(self, again: StepAgain, at: Configuration, slides: Array | None) -> None:
+        """Take what friction depends on turns of R̃ and on ω̃, and add what moments do (`forces.loads`)."""
+        self.slides, moments = slides, again.problem.moments
+        if slides is None and moments.exists:
+            self.slides = np.zeros((len(self.unknown), 6, again.size))
+        for f, moment in zip(moments.body, moments.present, strict=True):
+            turn = again.stage.predicted_body_rotation[f] @ at.body_rotation[f].T
+            for c in range(3):
+                change = 0.5 * cross_matrix(moment) @ cross_matrix(np.eye(3)[c]) @ turn
+                self.slides[f, c, self.unknown[f, 3:]] -= _axial(change)
+
     # places of what bodies hold
 
     def spread(self, moved: Array) -> Array:
@@ -125,26 +142,30 @@ class BodyRates:
         origin[self.unknown[:, 3:]] = found
 
     def predict(self, origin: Array, speed: Array) -> Array:
-        """Write the origin of what is held; return turns to where inertia takes bodies, shape (n_free, 3, n)."""
+        """Write the origin of what is held; return turns to where inertia takes bodies, and changes of ω̃, shape
+        (n_free, 6, n).
+        """
         of, turn, spin = self._of, self._turns(origin), self._turns(speed)
         ahead = of["p_turn"] @ turn + of["p_spin"] @ spin
         rate = of["w_turn"] @ turn + of["w_spin"] @ spin
         moved = origin[self.unknown[self.free, :3]]
         origin[self.rows] = moved + self._by_turn @ ahead[self.free] + self._by_spin @ rate[self.free]
-        return ahead
+        return np.concatenate([ahead, rate], axis=1)
 
     def guess(self, origin: Array, speed: Array, ahead: Array, guess: Array) -> None:
         """Write where the first guess of what is held goes."""
         x = self.unknown[self.free, :3]
-        guess[self.rows] = origin[x] + self.length * speed[x] + self._ahead @ ahead[self.free]
+        guess[self.rows] = origin[x] + self.length * speed[x] + self._ahead @ ahead[self.free, :3]
 
     def push(self, ahead: Array, right: Array) -> None:
-        """Add the moments of inertia by turns to where it takes bodies."""
-        right[self.unknown[:, 3:]] -= self._of["k_before"] @ ahead / (self.length * self.momentum_length)
+        """Add what turns to where inertia takes bodies make of its moments; they and ω̃ also of other moments."""
+        right[self.unknown[:, 3:]] -= self._of["k_before"] @ ahead[:, :3] / (self.length * self.momentum_length)
+        if self.slides is not None:
+            right += np.einsum("fcj,fcn->jn", self.slides, ahead)
 
     def end(self, end: Array, origin_speed: Array, ahead: Array, end_speed: Array) -> None:
         """Write angular momenta at the end."""
-        change = self._of["k_before"] @ ahead + self._of["k_end"] @ self._turns(end)
+        change = self._of["k_before"] @ ahead[:, :3] + self._of["k_end"] @ self._turns(end)
         end_speed[self.unknown[:, 3:]] = self._turns(origin_speed) - change / self.length
 
     # backward
@@ -156,26 +177,34 @@ class BodyRates:
         end_speed[turns] = 0.0
         origin_speed[turns] += by
         end[turns] -= self._of["k_end"].swapaxes(1, 2) @ by / self.length
-        return -self._of["k_before"].swapaxes(1, 2) @ by / self.length
+        return self._by_ahead(by / self.length)
+
+    def _by_ahead(self, moments: Array) -> Array:
+        """Return derivatives by what `predict` returns, from those by moments of inertia, shape (n_free, 3, n)."""
+        found = -self._of["k_before"].swapaxes(1, 2) @ moments
+        return np.concatenate([found, np.zeros_like(found)], axis=1)
 
     def push_back(self, right: Array) -> Array:
-        """Return derivatives by turns to where inertia takes bodies."""
-        return -self._of["k_before"].swapaxes(1, 2) @ self._turns(right) / (self.length * self.momentum_length)
+        """Return derivatives by turns to where inertia takes bodies, and by ω̃."""
+        found = self._by_ahead(self._turns(right) / (self.length * self.momentum_length))
+        if self.slides is not None:
+            found += np.einsum("fcj,jn->fcn", self.slides, right)
+        return found
 
     def guess_back(self, guess: Array, origin: Array, speed: Array, ahead: Array) -> None:
         """Take derivatives by the first guess of what is held."""
         by, x = guess[self.rows], self.unknown[self.free, :3]
         np.add.at(origin, x, by)
         np.add.at(speed, x, self.length * by)
-        np.add.at(ahead, self.free, self._ahead.swapaxes(1, 2) @ by)
+        np.add.at(ahead[:, :3], self.free, self._ahead.swapaxes(1, 2) @ by)
 
     def predict_back(self, origin: Array, speed: Array, ahead: Array) -> None:
         """Take derivatives by the origin of what is held, and by turns to where inertia takes bodies."""
         of, turns, by = self._of, self.unknown[:, 3:], origin[self.rows]
         origin[self.rows] = 0.0
         np.add.at(origin, self.unknown[self.free, :3], by)
+        ahead, rate = ahead[:, :3], ahead[:, 3:]
         np.add.at(ahead, self.free, self._by_turn.swapaxes(1, 2) @ by)
-        rate = np.zeros_like(ahead)
         np.add.at(rate, self.free, self._by_spin.swapaxes(1, 2) @ by)
         origin[turns] += of["p_turn"].swapaxes(1, 2) @ ahead + of["w_turn"].swapaxes(1, 2) @ rate
         speed[turns] += of["p_spin"].swapaxes(1, 2) @ ahead + of["w_spin"].swapaxes(1, 2) @ rate

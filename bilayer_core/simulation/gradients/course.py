@@ -20,12 +20,13 @@ FROM_OUTSIDE = ("override", "friction", "pose_goal")
 
 @dataclass
 class _Span:
-    """Steps between two kept states: when each ends, and whether another method stood in."""
+    """Steps between two kept states: when each ends, whether another method stood in, and `Engine.spread` of each."""
 
     start: Array
     outside: Array
     ends: list[float]
     stood_in: list[bool]
+    spread: list[Array]
 
 
 class Course:
@@ -69,10 +70,11 @@ class Course:
         """Take a step that was just made."""
         end, outside = self._state.values.copy(), self._outside
         if not self._spans or len(self._spans[-1].ends) == self._stride or self._differs(outside):
-            self._spans.append(_Span(self._last, outside, [], []))
+            self._spans.append(_Span(self._last, outside, [], [], []))
         span = self._spans[-1]
         span.ends.append(float(self._state.time[0]))
         span.stood_in.append(self._stepper.engine.stood_in)
+        span.spread.append(self._stepper.engine.spread)
         self._last = end
         if len(self._spans) > self._most:
             self._thin()
@@ -94,6 +96,7 @@ class Course:
                 if last.outside.tobytes() == span.outside.tobytes():
                     last.ends += span.ends
                     last.stood_in += span.stood_in
+                    last.spread += span.spread
                     continue
             joined.append(span)
         self._spans = joined
@@ -120,7 +123,7 @@ class Course:
                 state.values[:] = end
             else:
                 maker.make_again(state, time, stood_in)
-            yield KeptStep(start, state.copy(), self._method(stood_in))
+            yield KeptStep(start, state.copy(), self._method(stood_in), span.spread[k])
 
     def repeat(self, maker: Stepper, state: State) -> None:
         """Make all steps from another state, with what was set from outside."""

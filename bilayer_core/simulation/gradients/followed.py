@@ -12,16 +12,22 @@ import math
 
 import numpy as np
 
-from bilayer_core.engine.steps_again import Differences, differentiate_followed, differentiate_momentum
-from bilayer_core.errors import InputError
+from bilayer_core.engine.steps_again import (
+    Differences,
+    differentiate_followed,
+    differentiate_friction,
+    differentiate_momentum,
+)
+from bilayer_core.forces.friction_change import FrozenChange
 from bilayer_core.model.force_slots import NAMES
 from bilayer_core.model.model import Model
+from bilayer_core.model.records.contacts import Sliding
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.step_again import Lacking, StepAgain
 
 Array = np.ndarray
-FOLLOWING = ("drag", "turning drag", "added mass", "followers", "friction", "rod friction")
+FOLLOWING = ("drag", "turning drag", "added mass", "followers", "moments", "friction", "rod friction")
 PRESSING = ("barrier", "rod barrier")
 """On which friction depends."""
 REACH = 2
@@ -29,18 +35,41 @@ REACH = 2
 COLOURS = 2 * REACH + 1
 FINE = 1e-5
 """Of the slip within which friction rests, of the smallest gap, and of a tenth of an edge: steps of differences."""
+SLIP = 1e-3
+"""Likewise, where differences see no kink of friction."""
+ORIGIN = ("origin_position", "origin_angle", "origin_pose_position", "origin_rotation")
+"""Parts of a stage that are moved."""
+
+
+def _rounded(h: float) -> float:
+    """Return a step, at most h, which positions take without rounding."""
+    return 2.0 ** math.floor(math.log2(h))
+
+
+def _room_for(sliding: Sliding) -> FrozenChange:
+    """Return a change of contacts, with room for all there may be."""
+    shapes = {"part": (2,), "rate": (3, 8)} | {name: (3,) for name in ("normal", "axis", "slip", "arm", "lever")}
+    most = len(sliding.load)
+    return FrozenChange(
+        count=np.zeros(1, dtype=np.int64),
+        **{name: np.zeros(most, dtype=np.int64) for name in ("first", "surface", "found")},
+        **{name: np.zeros((most, *shapes.get(name, ()))) for name in ("load", "smooth", *shapes)},
+    )
 
 
 class Followed:
     """Derivatives of the forces of a model that follow the configuration."""
 
     def __init__(self, model: Model, again: StepAgain):
-        self._forces = [name for name in FOLLOWING if name in model.forces]
+        moments = again.problem.moments
+        turning = moments.exists and moments.dead < len(moments.body)
+        self._forces = [name for name in FOLLOWING if name in model.forces and (turning or name != "moments")]
+        self._otherwise = not set(self._forces) <= {"friction", "rod friction"}
         if not self._forces:
             return
         pressing = [name for name in PRESSING if name in model.forces]
         self._pressing, self._following = (
-            np.array([name in chosen for name in NAMES]) for chosen in (pressing, self._forces)
+            np.array([name in chosen for name in NAMES]) for chosen in (pressing, set(self._forces) - {"friction"})
         )
         strands, nodes = again.problem.strands, len(again.of_nodes)
         self._first, self._ways = strands.edge_node[: len(again.of_edges)], np.asarray(strands.axes)
@@ -75,31 +104,40 @@ class Followed:
         problem, stage, at = again.problem, again.stage, again.places[n + 1]
         rubbing = problem.rod_contact.exists and problem.rod_contact.sliding.count[0] > 0
         sliding = problem.sliding.exists and problem.sliding.count[0] > 0
-        if not (rubbing or sliding or any("friction" not in name for name in self._forces)):
-            return None, None, None
+        if not (rubbing or sliding or self._otherwise):
+            return None, None, None, None
+        h, alone, friction = 0.1 * FINE * self._shortest, self._held, FrozenChange.absent()
+        if rubbing:
+            h = min(h, FINE * problem.rod_contact.threshold * stage.length, FINE * again.gap)
+            alone = np.union1d(self._alone(problem.rod_contact.sliding), alone)
         if sliding:
-            self._refuse_on_bodies(again)
-        h = 0.1 * FINE * self._shortest
-        if sliding or rubbing:
-            threshold = (problem.sliding if problem.sliding.exists else problem.rod_contact).threshold
-            h = min(h, FINE * threshold * stage.length, FINE * again.gap)
-        h = 2.0 ** math.floor(math.log2(h))  # which positions take without rounding
-        alone = np.union1d(self._alone(problem.rod_contact.sliding), self._held) if rubbing else self._held
+            alone = np.union1d(self._near(self._on_free(again), 1), alone)
+            friction = _room_for(problem.sliding)
         colour, edge_colour = self._colours.copy(), self._edge_colours.copy()
         colour[alone] = COLOURS + np.arange(len(alone))
         edges = np.flatnonzero(np.isin(self._first, alone))
         edge_colour[edges] = COLOURS + np.arange(len(edges))
-        found, colours = self._differences(again, colour, edge_colour), COLOURS + len(alone)
-        origin = stage.origin_position.copy(), stage.origin_angle.copy()
-        differentiate_followed(problem, found, at, again.spare, stage, h)
-        stage.origin_position[:], stage.origin_angle[:] = origin
+        found, colours = self._differences(again, colour, edge_colour, friction), COLOURS + len(alone)
+        kept = [getattr(stage, name) for name in ORIGIN]
+        before = [part.copy() for part in kept]
+        if rubbing or self._otherwise:
+            differentiate_followed(problem, found, at, again.spare, stage, _rounded(h))
+        if sliding:
+            h = min(h, SLIP * problem.sliding.threshold * stage.length, FINE * again.gap)
+            differentiate_friction(problem, found, at, again.spare, stage, _rounded(h))
+        for part, values in zip(kept, before, strict=True):
+            part[...] = values
         apart = again.of_nodes[alone].ravel(), again.of_edges[edges]
         bodies, rods = again.of_bodies.ravel(), len(found.by_origin)
         by_place = self._entries(found.by_place[:rods], colours, apart).beside(found.by_place[rods:], bodies)
+        by_pose = found.by_pose.reshape(-1, 9, again.size)
+        by_pose[:, 6:] *= stage.length
+        by_origin = self._entries(found.by_origin, colours, apart)
         return (
             by_place,
-            self._entries(found.by_origin, colours, apart),
+            by_origin.beside(by_pose[:, :3].reshape(-1, again.size), again.of_bodies[:, :3].ravel()),
             self._by_director(again, found.by_director, edges),
+            by_pose[:, 3:],
         )
 
     def _by_director(self, again: StepAgain, rows: Array, edges: Array) -> Entries | None:
@@ -116,15 +154,16 @@ class Followed:
         found = Entries(row, column, value, (size, again.stage.origin_strain.size))
         return found.beside(rows[own.ravel()], of_alone)
 
-    def _refuse_on_bodies(self, again: StepAgain) -> None:
-        """Refuse friction on free bodies: its slip depends on their turns, too."""
+    def _on_free(self, again: StepAgain) -> Array:
+        """Return nodes of rods that rub on free bodies."""
         surfaces, sliding, free = again.problem.surfaces, again.problem.sliding, again.problem.bodies.free_index
-        count = sliding.count[0]
-        bodies = surfaces.body[sliding.surface[:count]], surfaces.contact_point_body[sliding.first[:count]]
-        if any((free[of[of >= 0]] >= 0).any() for of in bodies):
-            raise InputError("gradient: a run is not differentiated through friction on a free body")
+        if not len(free):
+            return np.zeros(0, dtype=int)
+        which = np.arange(sliding.count[0])
+        of_rods = surfaces.contact_point_body[sliding.first[which]] < 0
+        return sliding.node[which[of_rods & (free[surfaces.body[sliding.surface[which]]] >= 0)]]
 
-    def _differences(self, again: StepAgain, colour: Array, edge_colour: Array) -> Differences:
+    def _differences(self, again: StepAgain, colour: Array, edge_colour: Array, friction: FrozenChange) -> Differences:
         """Return arrays for differences by unknowns of these colours."""
         colours = max(COLOURS, int(colour.max()) + 1)
         rows = colours * len(self._ways) + (max(COLOURS, int(edge_colour.max()) + 1) if self._turns else 0)
@@ -136,10 +175,12 @@ class Followed:
             edge_colour=edge_colour,
             by_place=np.zeros((rows + bodies, again.size)),
             by_origin=np.zeros((rows, again.size)),
+            by_pose=np.zeros((9 * len(again.of_bodies), again.size)),
             by_director=np.zeros((3 * (int(edge_colour.max()) + 1) if self._raised else 0, again.size)),
             by_law=np.zeros((0, 0)),
             pressing=self._pressing,
             following=self._following,
+            friction=friction,
         )
 
     def _alone(self, touching) -> Array:
@@ -169,7 +210,7 @@ class Followed:
         """Return how the fluid's momentum depends on a configuration and on velocities, shapes (size, size)."""
         fluid, size, nodes = again.problem.fluid, again.size, again.of_nodes
         fluid.node_velocity[:] = velocity
-        found = self._differences(again, self._colours, self._edge_colours)
+        found = self._differences(again, self._colours, self._edge_colours, FrozenChange.absent())
         differentiate_momentum(again.problem, found, at, again.spare, again.stage, 0.1 * FINE * self._shortest)
         inertia = np.zeros((len(nodes), 3, 3))
         for end in range(2):

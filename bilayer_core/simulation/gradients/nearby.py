@@ -49,12 +49,18 @@ class Builders:
     state_of: Callable[[Model], State]
 
 
-def refuse_other_plane(model: Model, other: Model, path: str) -> None:
-    """Refuse a number that turns the plane of a model of dimension 2, in which its unknowns are."""
-    if model.plane.exists and not np.allclose(model.plane.normal, other.plane.normal, rtol=0.0, atol=SAME_PLANE):
+def refuse_other_plane(model: Model, other: Model, path: str, moves: bool = True) -> None:
+    """Refuse a number that turns the plane of a model of dimension 2, in which its unknowns are, and one that moves it
+    unless the plane `moves` with all that is there.
+    """
+    if not model.plane.exists:
+        return
+    normal, shift = model.plane.normal, other.start_position[0] - model.start_position[0]
+    away = [] if moves else [shift @ normal]
+    if not np.allclose([*(other.plane.normal - normal), *away], 0.0, atol=SAME_PLANE):
         raise InputError(
-            f"gradient: {path} turns the plane in which this model moves; allowed are numbers that keep it, or "
-            "`solver.dimension: 3`"
+            f"gradient: {path} {'turns' if moves else 'turns or moves'} the plane in which this model moves; allowed "
+            "are numbers that keep it, or `solver.dimension: 3`"
         )
 
 

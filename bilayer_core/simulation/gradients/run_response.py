@@ -21,10 +21,12 @@ import numpy as np
 from bilayer_core.engine.newton import SETTLED_WITHIN
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.model.model import Model
+from bilayer_core.model.records.parts import Drives
 from bilayer_core.model.state import PARTS, State
 from bilayer_core.observed.frame import Description
 from bilayer_core.simulation.gains import put_gains
 from bilayer_core.simulation.gradients.course import Course
+from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
 from bilayer_core.simulation.gradients.followed import FOLLOWING
 from bilayer_core.simulation.gradients.nearby import (
     PLACES,
@@ -36,7 +38,7 @@ from bilayer_core.simulation.gradients.nearby import (
     slope,
     values_of,
 )
-from bilayer_core.simulation.gradients.parameters import STEP, laws_of, numbers_of, scale_of, scene_with
+from bilayer_core.simulation.gradients.parameters import STEP, laws_of, numbers_of, scene_with
 from bilayer_core.simulation.gradients.step_again import KeptStep, Reached, StepAgain
 from bilayer_core.simulation.gradients.step_rates import Inputs, Rates, StepRates
 from bilayer_core.simulation.same_model import differing
@@ -59,15 +61,21 @@ DIFFERENTIATED = {
     "barrier",
     "rod barrier",
     "gyroscopic",
+    "joints",
+    "joint friction",
     *FOLLOWING,
 }
 """Forces through which runs are differentiated."""
 SEEDS = ("positions", "velocities")
 """By which a derivative comes back from the end of a run."""
-AT_END = ("strain_rate", "reached", "strain_push")
+AT_END = ("speed", "strain_rate", "reached", "strain_push")
 """Rates that a number changes by itself at the end of a step."""
 FORGETS = 1e6
 """Lengths of the rod by which a derivative by a number, times its size, moves it."""
+BESIDE, LEAST = 1e3, 1e-9
+"""Distance from the end of a step beyond which derivatives may be wrong, over what Newton's tolerance lets it be off,
+and of the longest rod.
+"""
 NEAR = 1e-5
 """h of a number, over its size, where barriers are steep."""
 
@@ -83,6 +91,7 @@ class Direct:
     stimulus: Array
     gain: Array
     gradient: list[Array]
+    speed: Array
     strain_rate: Array
     reached: Array
     strain_push: Array
@@ -117,6 +126,11 @@ class Number:
     agains: list[StepAgain] = field(default_factory=list)
     own: bool = False
     rates: list[tuple[Array, Array]] | None = None
+
+
+def _modes_of(drives: Drives) -> tuple[Array, Array, Array]:
+    """Return the channel and the time constants of each mode."""
+    return np.repeat(drives.field_channel, np.diff(drives.field_first)), drives.mode_rising, drives.mode_falling
 
 
 class RunResponse:
@@ -160,6 +174,7 @@ class RunResponse:
         self._here = agains[0]
         self._maker = builders.stepper_of(self.model)
         self.from_start = self._begins_at_start()
+        self._left = 0.0
 
     def _refuse(self) -> None:
         """Refuse what is not differentiated, by its name."""
@@ -168,10 +183,8 @@ class RunResponse:
         reasons = [f"the force {name!r}" for name in others]
         if model.free_count and self._stepper.engine.methods[0].history:
             reasons.append("free bodies with an integrator that keeps derivatives")
-        if model.free_count and not {"viscosity", "added mass"}.isdisjoint(model.forces):
-            reasons.append("free bodies beside viscosity or added mass")
-        if len(model.joins.first):
-            reasons.append("closed rods")
+        if model.free_count and "added mass" in model.forces:
+            reasons.append("free bodies beside added mass")
         if "added mass" in model.forces and self._stepper.engine.problem.raised.exists:
             reasons.append("added mass of layers that are unlike")
         if any(
@@ -179,8 +192,6 @@ class RunResponse:
             for method in self._stepper.engine.methods
         ):
             reasons.append("an integrator whose steps end beyond their last stage")
-        if self.scene.start == SETTLE:
-            reasons.append("a start that settles")
         problem = self._stepper.engine.problem
         if problem.light.exists:
             reasons.append("light")
@@ -206,6 +217,11 @@ class RunResponse:
     def _begins_at_start(self) -> bool:
         """Return whether the run began at the start of its scene, which depends on the scene's numbers."""
         own, start = self._builders.state_of(self.model), self._course.start
+        if self.scene.start == SETTLE and start.time[0] == 0.0:
+            moving = start.velocity, start.spin, start.body_velocity, start.body_angular_velocity
+            if any(part.any() for part in moving):
+                raise InputError("gradient: a run is not differentiated through a start that settles and then moves")
+            return True
         parts = ("time", "position", "velocity", "director1", "spin", "transduction", "body_position", "body_rotation")
         return all(np.array_equal(getattr(own, part), getattr(start, part)) for part in parts)
 
@@ -238,7 +254,7 @@ class RunResponse:
         return {name: [self._number(path, value, laws.get(path)) for path, value in of] for name, of in paths.items()}
 
     def _number(self, path: str, value: float, laws: Array | None) -> Number:
-        found = Number(path, value, scale_of(value))
+        found = Number(path, value, abs(value) or min(1.0, self._size * STEP / self._step))
         if laws is not None:
             found.laws = laws
             return found
@@ -257,7 +273,7 @@ class RunResponse:
                 states = [self._builders.state_of(again.model) for again in found.agains]
                 found.rates = [(state.strain_rate, state.strain_acceleration) for state in states]
         for again in found.agains:
-            refuse_other_plane(self.model, again.model, path)
+            refuse_other_plane(self.model, again.model, path, moves=False)
             own, others = self._here.problem, again.problem
             if not np.array_equal(own.bodies.second_moment, others.bodies.second_moment):
                 raise InputError(f"gradient: {path} changes how free bodies turn, by which runs are not differentiated")
@@ -272,10 +288,15 @@ class RunResponse:
         here = self._here
         place, speed = np.zeros(here.size), np.zeros(here.size)
         own = self._course.start
-        if not self.from_start or number.laws.size:
+        if self.from_start and self.scene.start == SETTLE:
+            h, states = self._settled(number)
+        elif self.from_start and not number.laws.size:
+            h, states = (
+                self._step * number.scale,
+                [self._builders.state_of(of.model) for of in number.agains or number.around],
+            )
+        else:
             return place, speed, 0.0 * own.strain_rate, 0.0 * own.transduction
-        h = self._step * number.scale
-        states = [self._builders.state_of(of.model) for of in number.agains or number.around]
 
         def rate(part: str) -> Array:
             return slope([getattr(state, part) for state in states], h)
@@ -293,11 +314,45 @@ class RunResponse:
         by_rotation = rate("body_rotation")[free] @ own.body_rotation[free].swapaxes(1, 2)  # [dφ]×
         place[here.of_bodies[:, 3:]] = np.stack([by_rotation[:, j, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1)
         speed[here.of_bodies[:, :3]] = rate("body_velocity")[free]
+        held = self.model.constrained  # nodes go with bodies: how they move against them is among what acts in steps
+        for node, holder, arm in zip(held.node, held.free, self._arms(own), strict=True):
+            if holder >= 0:
+                motion = place[here.of_bodies[holder]]
+                place[here.of_nodes[node]] = motion[:3] + np.cross(motion[3:], arm)
         momenta = [self._momenta(of, state) for of, state in zip(number.agains, states, strict=False)]
         if momenta and len(free):
             speed[here.of_bodies[:, 3:]] = slope(momenta, h)
         rates = rate("strain_rate") if number.rates is None else np.zeros(here.end_rates.size)
-        return self._rates.constants.moves @ place, speed, rates, rate("transduction")
+        alike = len(states[0].transduction) == len(own.transduction)
+        reached = rate("transduction") if alike else 0.0 * own.transduction
+        return self._rates.constants.moves @ place, speed, rates, reached
+
+    def _settled(self, number: Number) -> tuple[float, list[State]]:
+        """Return a step of a number, and the equilibria from which runs begin with it at `PLACES`."""
+        rest = Equilibrium(self._stepper, self._course.start, self._builders, self._description)
+        response = rest.respond(rest.parameters([number.path])[number.path][0])
+        motions = [response.motion * (place * response.h) for place in PLACES]
+        return response.h, [near.moved(motion) for near, motion in zip(response.nearby, motions, strict=True)]
+
+    def _arms(self, state: State) -> Array:
+        """Return the arms of nodes that bodies hold, shape (n_held, 3)."""
+        held = self.model.constrained
+        return np.einsum("kij,kj->ki", state.body_rotation[held.body], held.position)
+
+    def _modes(self, model: Model) -> Array:
+        """Return the mode of this model for each of another, whose layers may be unlike: that with its time constants.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        own, other = ([*zip(*_modes_of(each.drives), strict=True)] for each in (self.model, model))
+        if len(own) == len(other):
+            return np.arange(len(own))
+        if not set(other) <= set(own):
+            raise InputError("gradient: a time constant that parts alike layers is not differentiated by")
+        return np.array([own.index(mode) for mode in other], dtype=np.int64)
 
     def _momenta(self, again: StepAgain, state: State) -> Array:
         """Return the angular momenta of free bodies, shape (n_free, 3)."""
@@ -314,6 +369,7 @@ class RunResponse:
             none.stimulus[:, :, 0],
             none.gain[:, 0],
             [],
+            np.zeros(here.size),
             np.zeros(here.end_rates.size),
             np.zeros(here.transduction.size),
             np.zeros(here.end_rates.size + here.wet),
@@ -329,8 +385,10 @@ class RunResponse:
                 self._replayed(again, replace(step, start=self._fitted(again, step.start, rates)), reached)
                 for again, rates in zip(number.agains, own, strict=True)
             ]
-            *found.gradient, reached_by, rates, push = (slope(values, h) for values in zip(*seen, strict=True))
-            found.reached = reached_by
+            *found.gradient, held, reached_by, rates, push = (slope(values, h) for values in zip(*seen, strict=True))
+            found.speed[here.held] = held
+            if len(reached_by) == len(found.reached):
+                found.reached = reached_by
             if number.rates is None:
                 found.strain_rate, found.strain_push = rates, push
             else:
@@ -361,7 +419,8 @@ class RunResponse:
             push = (push - carry * step.start.strain_acceleration) / (1.0 - carry)
             if not step.method.history:
                 push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
-        return [*gradients, again.transduction.copy(), again.end_rates.copy(), np.concatenate([push, of_fluid])]
+        held = again.speeds_of_held.copy()
+        return [*gradients, held, again.transduction.copy(), again.end_rates.copy(), np.concatenate([push, of_fluid])]
 
     def _fitted(self, again: StepAgain, state: State, rates: tuple[Array, Array] | None) -> State:
         """Return a state that a model with another number takes: with what only such models have, prescribed bodies
@@ -373,6 +432,7 @@ class RunResponse:
             mine, part = getattr(fitted, name), getattr(state, name)
             if mine.shape == part.shape:
                 mine[...] = part
+        fitted.transduction[:] = state.transduction[self._modes(model)]
         if rates is not None:
             fitted.strain_rate[:] = rates[0]
             if self._history:
@@ -428,7 +488,17 @@ class RunResponse:
         return along
 
     def _note(self, step: KeptStep, reached: Sequence[Reached]) -> None:
-        self._left = max(self._left, float(np.abs(reached[-1].position - step.end.position).max()))
+        """Note how far from the end of a step it ended now, and tell the first time that this is too far."""
+        left = float(np.abs(reached[-1].position - step.end.position).max())
+        most = max(BESIDE * self._stepper.steps.newton_tolerance * step.length, LEAST * self._size)
+        if left > most >= self._left:
+            warnings.warn(
+                f"gradient: the step from {step.begin:.6g} s, made again, ends {left:.2g} m beside where it ended in "
+                "the run: derivatives may be wrong; choose a smaller newton_tolerance",
+                RuntimeWarning,
+                stacklevel=5,
+            )
+        self._left = max(self._left, left)
 
     def _look_at(self, rates: Rates, step: KeptStep, per: Array | float, most: float) -> None:
         """Tell once where a motion has forgotten its start: where rates are `most` times `per` or more."""
@@ -459,10 +529,11 @@ class RunResponse:
             (back.place if name == SEEDS[0] else back.speed)[here.of_nodes, 0] = given
         back.place, back.speed = free @ back.place, free @ back.speed
         begun = self._rates_at_starts([number for number in numbers if number.rates is not None])
-        found, self._forgets = np.zeros(len(numbers)), False
+        found, self._left, self._forgets = np.zeros(len(numbers)), 0.0, False
         given, tolerance = np.abs(back.place).max(), self._stepper.steps.newton_tolerance
         for step in self._course.steps(self._maker, backward=True):
             reached = rates.take(step)
+            self._note(step, reached)
             end = back
             back, acts, direct = rates.backward(end)
             if given > 0.0:  # what Newton's method leaves then moves the end by more than the rod's length
@@ -528,7 +599,7 @@ class RunResponse:
         state.spin += way * along.speed[self._here.of_edges, k]
         if number.rates is None:
             state.strain_rate += way * along.strain_rate[:, k]
-        state.transduction += way * along.reached[:, k]
+        state.transduction += way * along.reached[self._modes(model), k]
         gains = model.drives.law_gain.copy()
         try:
             if number.laws.size:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -35,8 +35,10 @@ from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.surroundings import Surroundings
 
 Array = np.ndarray
-Lacking = tuple[Entries | None, Entries | None, Entries | None]
-"""What a Hessian lacks, and the gradient by the origin of a stage and directors there; None for nothing."""
+Lacking = tuple[Entries | None, Entries | None, Entries | None, Array | None]
+"""What a Hessian lacks, and the gradient by the origin of a stage, by directors there, and by the turns R̃ and spins ω̃
+of free bodies (`BodyRates.slides`); None for nothing.
+"""
 ROUNDS, ROUNDED = 80, 1e-13
 """Of solutions with what a Hessian lacks: the most there may be, and what may be left, of the whole."""
 SMALL = 1e-3
@@ -56,11 +58,14 @@ class KeptStep:
     start, end : State
         Before and after; what is set from outside is as it acted.
     method : Method
+    spread : ndarray
+        Contacts that friction spread in its stages; see `Engine.spread`.
     """
 
     start: State
     end: State
     method: Method
+    spread: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @property
     def begin(self) -> float:
@@ -86,7 +91,7 @@ class Reached:
 
 
 class StepAgain(Evaluator):
-    """Makes kept steps again, without contact of friction, free bodies and fluids.
+    """Makes kept steps again.
 
     Parameters
     ----------
@@ -161,6 +166,18 @@ class StepAgain(Evaluator):
         return self._work.end.strain_rate
 
     @property
+    def held(self) -> Array:
+        """Rows of unknowns of nodes that free bodies hold, shape (n_held, 3)."""
+        constrained = self.problem.constrained
+        return self.of_nodes[constrained.node[constrained.free >= 0]]
+
+    @property
+    def speeds_of_held(self) -> Array:
+        """Velocities of these at the end of the stage, likewise."""
+        constrained = self.problem.constrained
+        return self._work.end.velocity[constrained.node[constrained.free >= 0]]
+
+    @property
     def gained_momentum(self) -> Array:
         """Gain of the fluid's momentum over the stage, shape (wet,)."""
         gained = np.zeros(self.wet)
@@ -175,13 +192,15 @@ class StepAgain(Evaluator):
 
     def start(self, n: int) -> None:
         """Start stage n, up to the first guess."""
-        step, places = self._step, (self.places[n], self.guesses[n])
+        step, places, origin = self._step, (self.places[n], self.guesses[n]), self.point
+        before = origin.vectors.copy(), origin.rotation.copy()
         while True:
             stage = self.problem, self._arrays, step.method, self._inputs, self._work
             status = begin_stage(*stage, n, step.length, *places)
             if status == READY:
                 return
             self._grow(status)
+            origin.vectors[:], origin.rotation[:] = before
 
     def go(self, n: int, reached: Reached) -> None:
         """Go from the first guess of stage n to where it ended."""
@@ -192,6 +211,10 @@ class StepAgain(Evaluator):
         for f, rotation in enumerate(reached.body_rotation):
             travel[self.of_bodies[f, 3:]] = rotation_vector(rotation @ guess.body_rotation[f].T)
         self.travel(guess, travel, self.places[n + 1])
+        if self._work.spread.size:
+            self._work.spread[:] = False
+            self._work.spread.ravel()[self._step.spread] = True
+            self.problem.sliding.spread.ravel()[:] = self._work.spread[n]
         self.follow(self.places[n + 1])
 
     def travel(self, base: Configuration, travel: Array, at: Configuration) -> None:
@@ -236,7 +259,7 @@ class StepAgain(Evaluator):
         the Hessian lacks there, as `matrices` has it.
         """
         self.go(n, self._expected(n))
-        lacking: Lacking = (None, None, None)
+        lacking: Lacking = (None, None, None, None)
         for k in range(MOST):
             at = self.places[n + 1]
             self.evaluate(at, second=True)

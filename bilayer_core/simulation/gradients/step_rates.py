@@ -29,12 +29,14 @@ import numpy as np
 from scipy import sparse
 
 from bilayer_core.engine.steps_again import Differences
+from bilayer_core.forces.friction_change import FrozenChange
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.scene.transduction import lagged
 from bilayer_core.simulation.gradients.body_rates import BodyRates
 from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.followed import FOLLOWING, Followed
+from bilayer_core.simulation.gradients.mechanism_rates import resistances, slopes_of_motions
 from bilayer_core.simulation.gradients.step_again import KeptStep, Lacking, Reached, StepAgain
 
 Array = np.ndarray
@@ -194,18 +196,22 @@ class Constants:
     def _groups(self, again: StepAgain) -> list[list[tuple[int, Array]]]:
         """Return groups of viscous strains that share no unknown, each with the unknowns that it depends on."""
         strands, bonds = again.problem.strands, again.problem.bonds
-        edges, joints = strands.edge_count, len(strands.joint_a)
+        edges, constrained = strands.edge_count, again.problem.constrained
+        holder = {node: f for node, f in zip(constrained.node, constrained.free, strict=True) if f >= 0}
+        clamped = again.problem.bodies.free_index[constrained.clamp_edge_body]
 
-        def of(*which: int) -> Array:
+        def of(*which: int, more: Sequence[int] = ()) -> Array:
             inner = [e for e in which if e < edges]
-            nodes = {n for e in inner for n in (strands.edge_node[e], strands.edge_node[e] + 1)}
-            return np.concatenate([self.nodes[sorted(nodes)].ravel(), strands.edge_unknown[inner]]).astype(int)
+            nodes = {n for e in inner for n in (strands.edge_node[e], strands.edge_node[e] + 1)} | set(more)
+            bodies = {holder[n] for n in nodes if n in holder} | {clamped[e - edges] for e in which if e >= edges}
+            bodies = sorted(bodies - {-1})
+            parts = self.nodes[sorted(nodes - set(holder))], strands.edge_unknown[inner], again.of_bodies[bodies]
+            return np.concatenate([part.ravel() for part in parts]).astype(int)
 
         seen = [of(e) for e in range(edges)]
         seen += [of(a, b) for a, b in zip(strands.joint_a, strands.joint_b, strict=True) for _ in range(3)]
         for k in range(len(bonds.joint)):
-            own = of(strands.joint_a[bonds.joint[k]], strands.joint_b[bonds.joint[k]])
-            seen += [np.union1d(own, self.nodes[bonds.node[k]].ravel())] * 3
+            seen += [of(strands.joint_a[bonds.joint[k]], strands.joint_b[bonds.joint[k]], more=bonds.node[k])] * 3
         groups: list[list[tuple[int, Array]]] = []
         taken: list[set[int]] = []
         for k in np.flatnonzero(self.viscous > 0.0):
@@ -216,7 +222,6 @@ class Constants:
                 taken.append(set())
             groups[place].append((int(k), seen[k]))
             taken[place] |= own
-        assert joints == len(strands.joint_b)
         return groups
 
     def tangents(self, at: Configuration) -> sparse.csr_matrix:
@@ -289,6 +294,7 @@ class StageRates:
     by_director: Entries | None = None  # ∂g by strains at the origin, by drag
     by_origin: Entries | None = None  # ∂g/∂Ȳ by the gyroscopic force, shape (size, size)
     bodies: BodyRates | None = None
+    resistance: Array | float = 0.0  # of motions of joints and guides, shape (n_strain, 1)
     momentum: tuple[Entries, Entries] | None = None  # of the fluid, by places at the end and by velocities
     way: tuple = ()  # of turns, by places at the start, at the first guess and at the end
     law_by_mode: Array = field(default_factory=lambda: np.zeros((0, 0)))
@@ -317,14 +323,17 @@ class StepRates:
             ways=none,
             by_place=none,
             by_origin=none,
+            by_pose=none,
             by_director=none,
             by_law=np.zeros((len(agains[0].laws), agains[0].size)),
             pressing=np.zeros(0, dtype=bool),
             following=np.zeros(0, dtype=bool),
+            friction=FrozenChange.absent(),
             **empty,
         )
         self._follower = Followed(model, agains[0])
         self._moving = [n for n in (*FOLLOWING, "inertia", "damping") if n in model.forces]
+        self._resisted = "joint friction" in model.forces
         self._moduli = agains[0].problem.moduli.exists or agains[0].problem.flattening.exists
 
     def take(self, step: KeptStep) -> list[Reached]:
@@ -351,16 +360,19 @@ class StepRates:
     def _strains(self, again: StepAgain, at: Configuration) -> Strains:
         """Return ∂σ/∂q at a configuration, with the gradient there evaluated where strains are viscous."""
         constants, stage = self.constants, again.stage
-        if not constants.groups:
+        if not (constants.groups or self._resisted):
             return Strains(constants, again, at, None)
         data, rows, columns = [np.zeros(0)], [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)]
+        if self._resisted:
+            motions = slopes_of_motions(again, at)
+            data, rows, columns = [motions.value], [motions.row], [motions.column]
         again.evaluate(at)
-        before, origin = again.sums.gradient.copy(), stage.origin_strain.copy()
+        before, origin = again.whole_gradient(), stage.origin_strain.copy()
         for group in constants.groups:
             for k, _ in group:
                 stage.origin_strain[k] -= STRAIN
             again.evaluate(at)
-            change = again.sums.gradient - before
+            change = again.whole_gradient() - before
             stage.origin_strain[:] = origin
             for k, seen in group:
                 data.append(change[seen] * (stage.length / (STRAIN * constants.viscous[k])))
@@ -376,6 +388,8 @@ class StepRates:
         found = StageRates(stage.length, stage.momentum_length, self._strains(again, at), self._by_laws(again, at))
         if again.of_bodies.size:
             found.bodies = BodyRates(again, at, self.step.method.couplings[n, :n], again.turned[:n])
+        if self._resisted:
+            found.resistance = resistances(again)[:, None]
         if constants.in_space:
             self._turning(again, n, found)
             if found.bodies:
@@ -383,6 +397,8 @@ class StepRates:
         if followed[0] is not None:
             self._add_followed(found, *followed[:2])
             found.by_director = followed[2]
+        if found.bodies:
+            found.bodies.add_slides(again, at, followed[3])
         if again.wet:
             velocity = (at.position - stage.origin_position) / stage.length
             found.momentum = self._follower.momentum(again, at, velocity)
@@ -528,6 +544,7 @@ class StepRates:
                 reached += stage.lag[2][:, None] * acts.stimulus[n, constants.channel]
             change = -constants.masses @ (origin + stage.length * origin_speed)
             change = change / (stage.length * stage.momentum_length) - constants.dissipation @ origin / stage.length
+            change[constants.of_strains] -= stage.resistance * origin[constants.of_strains] / stage.length
             right = change[:size] + stage.strains.pull_back(change[constants.of_strains])
             if bodies:
                 right = bodies.gather(right)
@@ -623,6 +640,7 @@ class StepRates:
                 origin_speeds[n][fluid] -= right / stage.momentum_length
             of_mass = constants.masses @ change / (stage.length * stage.momentum_length)
             origins[n] -= of_mass + constants.dissipation @ change / stage.length
+            origins[n][constants.of_strains] -= stage.resistance * change[constants.of_strains] / stage.length
             origin_speeds[n] -= stage.length * of_mass
             reached = end.reached if n + 1 == count else np.zeros_like(end.reached)
             if len(stage.law_by_gain):
