@@ -12,12 +12,16 @@ rotation vectors, θ of earlier ones from their origins, as in `engine.stages`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from scipy import sparse
 
-from bilayer_core.model.records.step import Configuration
+from bilayer_core.forces.body_drag import BodyFlow
+from bilayer_core.model.records.step import Configuration, Method
+from bilayer_core.model.state import State
+from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.step_again import StepAgain, cross_matrix, left_jacobian, rotation_of
 
 Array = np.ndarray
@@ -25,6 +29,19 @@ Array = np.ndarray
 
 def _axial(a: Array) -> Array:
     return np.array([a[2, 1] - a[1, 2], a[0, 2] - a[2, 0], a[1, 0] - a[0, 1]])
+
+
+def drag_by_origin(flow: BodyFlow, again: StepAgain, at: Configuration) -> Entries:
+    """Return how the drag of bodies depends on where they were at the origin of a stage, shape (size, size)."""
+    stage, size, blocks, rows = again.stage, again.size, [], []
+    for f, coefficient in zip(flow.free, flow.coefficient, strict=True):
+        v = (at.body_position[f] - stage.origin_body_position[f]) / stage.length - flow.velocity
+        speed = math.sqrt(float(v @ v))
+        along = np.outer(v, v) / speed if speed > 0.0 else np.zeros((3, 3))
+        blocks.append(-coefficient / stage.length * (speed * np.eye(3) + along))
+        rows.append(again.of_bodies[f, :3])
+    row = np.repeat(np.array(rows)[:, :, None], 3, axis=2)
+    return Entries(row.ravel(), row.swapaxes(1, 2).ravel(), np.array(blocks).ravel(), (size, size))
 
 
 class BodyRates:
@@ -49,6 +66,7 @@ class BodyRates:
     def __init__(self, again: StepAgain, at: Configuration, couplings: Sequence[float], turned: Sequence[Array]):
         problem, stage, point = again.problem, again.stage, again.point
         self.slides: Array | None = None
+        self._bodies = again.problem.bodies.body_of_free
         self.unknown, self.length, self.momentum_length = again.of_bodies, stage.length, stage.momentum_length
         constrained, h = problem.constrained, stage.length
         held = np.flatnonzero(constrained.free >= 0)
@@ -132,7 +150,35 @@ class BodyRates:
         moves = sparse.csr_matrix((np.ones(self.rows.size), where), shape=(size, size))
         return (sparse.diags(self.freed[:, 0]) + of_turns + moves).tocsr()
 
+    def keep(self, state: State, moments: Array, method: Method, n: int, length: float) -> None:
+        """Take by what a history turns the origin of stage n: it depends on turns at the start of the step, on L and on
+        its derivative M there; `moments` are those of inertia.
+
+        It turns by x = c h ω + d h² ω̇, with I ω = L and I ω̇ = M − ω × L.
+        """
+        c, d = method.along[n] * length, method.bend * length**2
+        self.history, self._beyond = np.zeros((len(self.unknown), 3, 9)), np.zeros((len(self.unknown), 3, 3))
+        for f, own in enumerate(moments):
+            b = self._bodies[f]
+            rotation, spin = state.body_rotation[b], state.body_angular_velocity[b]
+            second = rotation @ own @ rotation.T
+            inertia = np.trace(second) * np.eye(3) - second
+            momentum, moment = inertia @ spin, state.body_moment[f] - np.cross(spin, inertia @ spin)
+            inverse = np.linalg.inv(inertia)
+            rate = inverse @ moment
+            by_turn, by_momentum, by_moment = (np.eye(3, 9, 3 * k) for k in range(3))
+            of_spin = inverse @ (by_momentum + cross_matrix(momentum) @ by_turn) - cross_matrix(spin) @ by_turn
+            of_moment = by_moment + cross_matrix(momentum) @ of_spin - cross_matrix(spin) @ by_momentum
+            of_rate = inverse @ (of_moment + cross_matrix(moment) @ by_turn) - cross_matrix(rate) @ by_turn
+            x = c * spin + d * rate
+            self.history[f], self._beyond[f] = left_jacobian(x) @ (c * of_spin + d * of_rate), rotation_of(x)
+
     # forward
+
+    def turn_by_history(self, first: Array, speed: Array, push: Array, origin: Array) -> None:
+        """Turn the origin on by what a history keeps."""
+        kept = [self._turns(of) for of in (first, speed, push)]
+        origin[self.unknown[:, 3:]] = self._beyond @ self._turns(origin) + self.history @ np.concatenate(kept, axis=1)
 
     def turn_origin(self, first: Array, origin: Array, gained: Sequence[tuple[Array, Array]]) -> None:
         """Write turns of the origin, from those at the start of the step and at ends and origins of earlier stages."""
@@ -208,6 +254,14 @@ class BodyRates:
         np.add.at(rate, self.free, self._by_spin.swapaxes(1, 2) @ by)
         origin[turns] += of["p_turn"].swapaxes(1, 2) @ ahead + of["w_turn"].swapaxes(1, 2) @ rate
         speed[turns] += of["p_spin"].swapaxes(1, 2) @ ahead + of["w_spin"].swapaxes(1, 2) @ rate
+
+    def turn_by_history_back(self, first: Array, speed: Array, push: Array, origin: Array) -> None:
+        """Take derivatives by what a history keeps, and leave those by turns of the origin without it."""
+        turns = self.unknown[:, 3:]
+        pulled = self.history.swapaxes(1, 2) @ origin[turns]
+        origin[turns] = self._beyond.swapaxes(1, 2) @ origin[turns]
+        for k, of in enumerate((first, speed, push)):
+            of[turns] += pulled[:, 3 * k : 3 * k + 3]
 
     def turn_origin_back(self, first: Array, origin: Array, ends: Sequence[Array], origins: Sequence[Array]) -> None:
         """Take derivatives by turns of the origin."""

@@ -39,6 +39,10 @@ class Entries:
         """The transpose."""
         return Entries(self.column, self.row, self.value, self.shape[::-1])
 
+    def __add__(self, other: Entries) -> Entries:
+        pairs = (self.row, other.row), (self.column, other.column), (self.value, other.value)
+        return Entries(*(np.concatenate(of) for of in pairs), self.shape)
+
     def beside(self, columns: Array, numbers: Array) -> Entries:
         """Return a matrix with some columns, shape (n, rows), beside its own."""
         if not len(columns):

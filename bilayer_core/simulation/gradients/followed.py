@@ -220,5 +220,6 @@ class Followed:
                 np.add.at(inertia, fluid.edge_node + end, halves)
         row, column = (np.broadcast_to(of, inertia.shape).ravel() for of in (nodes[:, :, None], nodes[:, None, :]))
         nothing = np.zeros(0, dtype=int), np.zeros(0, dtype=int)
-        by_place = self._entries(found.by_place[: len(found.by_origin)], COLOURS, nothing)
+        rods, bodies = len(found.by_origin), again.of_bodies.ravel()
+        by_place = self._entries(found.by_place[:rods], COLOURS, nothing).beside(found.by_place[rods:], bodies)
         return by_place, Entries(row, column, inertia.ravel(), (size, size))

@@ -61,6 +61,7 @@ DIFFERENTIATED = {
     "barrier",
     "rod barrier",
     "gyroscopic",
+    "body drag",
     "joints",
     "joint friction",
     *FOLLOWING,
@@ -68,7 +69,7 @@ DIFFERENTIATED = {
 """Forces through which runs are differentiated."""
 SEEDS = ("positions", "velocities")
 """By which a derivative comes back from the end of a run."""
-AT_END = ("speed", "strain_rate", "reached", "strain_push")
+AT_END = ("speed", "push", "strain_rate", "reached", "strain_push")
 """Rates that a number changes by itself at the end of a step."""
 FORGETS = 1e6
 """Lengths of the rod by which a derivative by a number, times its size, moves it."""
@@ -76,6 +77,8 @@ BESIDE, LEAST = 1e3, 1e-9
 """Distance from the end of a step beyond which derivatives may be wrong, over what Newton's tolerance lets it be off,
 and of the longest rod.
 """
+LOST = 1e-9
+"""Part of a rate that is lost by rounding."""
 NEAR = 1e-5
 """h of a number, over its size, where barriers are steep."""
 
@@ -92,6 +95,7 @@ class Direct:
     gain: Array
     gradient: list[Array]
     speed: Array
+    push: Array
     strain_rate: Array
     reached: Array
     strain_push: Array
@@ -126,6 +130,12 @@ class Number:
     agains: list[StepAgain] = field(default_factory=list)
     own: bool = False
     rates: list[tuple[Array, Array]] | None = None
+
+
+def _inertia(second_moment: Array, rotation: Array) -> Array:
+    """Return the tensor of inertia of a turned body from its second moment."""
+    second = rotation @ second_moment @ rotation.T
+    return np.trace(second) * np.eye(3) - second
 
 
 def _modes_of(drives: Drives) -> tuple[Array, Array, Array]:
@@ -181,10 +191,6 @@ class RunResponse:
         model = self.model
         others = [name for name in model.forces if name not in DIFFERENTIATED]
         reasons = [f"the force {name!r}" for name in others]
-        if model.free_count and self._stepper.engine.methods[0].history:
-            reasons.append("free bodies with an integrator that keeps derivatives")
-        if model.free_count and "added mass" in model.forces:
-            reasons.append("free bodies beside added mass")
         if "added mass" in model.forces and self._stepper.engine.problem.raised.exists:
             reasons.append("added mass of layers that are unlike")
         if any(
@@ -197,8 +203,6 @@ class RunResponse:
             reasons.append("light")
         if problem.varied_fields.exists:
             reasons.append("diffusion that varies with what it brings")
-        if "flattening" in model.forces and "viscosity" in model.forces:
-            reasons.append("viscosity of strips")
         if reasons:
             raise InputError(f"gradient: a run is not differentiated through {', '.join(reasons)}")
 
@@ -274,9 +278,6 @@ class RunResponse:
                 found.rates = [(state.strain_rate, state.strain_acceleration) for state in states]
         for again in found.agains:
             refuse_other_plane(self.model, again.model, path, moves=False)
-            own, others = self._here.problem, again.problem
-            if not np.array_equal(own.bodies.second_moment, others.bodies.second_moment):
-                raise InputError(f"gradient: {path} changes how free bodies turn, by which runs are not differentiated")
         if any(
             again.size != self._here.size or again.model.node_count != self.model.node_count for again in found.agains
         ):
@@ -325,6 +326,13 @@ class RunResponse:
         rates = rate("strain_rate") if number.rates is None else np.zeros(here.end_rates.size)
         alike = len(states[0].transduction) == len(own.transduction)
         reached = rate("transduction") if alike else 0.0 * own.transduction
+        ways, of_bodies = here.problem.bodies.freedom, place[here.of_bodies].ravel()
+        lost = of_bodies - ways @ np.linalg.lstsq(ways, of_bodies, rcond=None)[0]
+        if np.abs(lost).max(initial=0.0) > LOST * np.abs(place).max(initial=0.0):
+            raise InputError(
+                f"gradient: {number.path} moves a body where its guide or joint does not let it go; differentiate by "
+                "what moves along with it"
+            )
         return self._rates.constants.moves @ place, speed, rates, reached
 
     def _settled(self, number: Number) -> tuple[float, list[State]]:
@@ -370,6 +378,7 @@ class RunResponse:
             none.gain[:, 0],
             [],
             np.zeros(here.size),
+            np.zeros(here.size),
             np.zeros(here.end_rates.size),
             np.zeros(here.transduction.size),
             np.zeros(here.end_rates.size + here.wet),
@@ -385,8 +394,13 @@ class RunResponse:
                 self._replayed(again, replace(step, start=self._fitted(again, step.start, rates)), reached)
                 for again, rates in zip(number.agains, own, strict=True)
             ]
-            *found.gradient, held, reached_by, rates, push = (slope(values, h) for values in zip(*seen, strict=True))
-            found.speed[here.held] = held
+            *found.gradient, held, momenta, reached_by, rates, push = (
+                slope(values, h) for values in zip(*seen, strict=True)
+            )
+            for rows, (speed, gained) in ((here.held, held), (here.of_bodies[:, 3:], momenta)):
+                found.speed[rows] = speed
+                if self._history:
+                    found.push[rows] = gained / (1.0 - step.method.carry)
             if len(reached_by) == len(found.reached):
                 found.reached = reached_by
             if number.rates is None:
@@ -419,8 +433,14 @@ class RunResponse:
             push = (push - carry * step.start.strain_acceleration) / (1.0 - carry)
             if not step.method.history:
                 push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
-        held = again.speeds_of_held.copy()
-        return [*gradients, held, again.transduction.copy(), again.end_rates.copy(), np.concatenate([push, of_fluid])]
+        return [
+            *gradients,
+            again.speeds_of_held,
+            again.momenta_of_bodies,
+            again.transduction.copy(),
+            again.end_rates.copy(),
+            np.concatenate([push, of_fluid]),
+        ]
 
     def _fitted(self, again: StepAgain, state: State, rates: tuple[Array, Array] | None) -> State:
         """Return a state that a model with another number takes: with what only such models have, prescribed bodies
@@ -433,6 +453,13 @@ class RunResponse:
             if mine.shape == part.shape:
                 mine[...] = part
         fitted.transduction[:] = state.transduction[self._modes(model)]
+        for f, b in enumerate(again.problem.bodies.body_of_free):
+            inertia = [
+                _inertia(of.problem.bodies.second_moment[f], state.body_rotation[b]) for of in (self._here, again)
+            ]
+            if not np.array_equal(*inertia):  # the momentum is kept
+                momentum = inertia[0] @ state.body_angular_velocity[b]
+                fitted.body_angular_velocity[b] = np.linalg.solve(inertia[1], momentum)
         if rates is not None:
             fitted.strain_rate[:] = rates[0]
             if self._history:
@@ -591,10 +618,10 @@ class RunResponse:
         for f, b in enumerate(evaluator.problem.bodies.body_of_free):
             of_body = evaluator.of_bodies[f]
             state.body_velocity[b] += way * along.speed[of_body[:3], k]
-            second = state.body_rotation[b] @ evaluator.problem.bodies.second_moment[f] @ state.body_rotation[b].T
-            if second.any():
+            inertia = _inertia(evaluator.problem.bodies.second_moment[f], state.body_rotation[b])
+            if inertia.any():
                 momentum = momenta[f] + way * along.speed[of_body[3:], k]
-                state.body_angular_velocity[b] = np.linalg.solve(np.trace(second) * np.eye(3) - second, momentum)
+                state.body_angular_velocity[b] = np.linalg.solve(inertia, momentum)
         state.velocity += way * along.speed[self._here.of_nodes, k]
         state.spin += way * along.speed[self._here.of_edges, k]
         if number.rates is None:

@@ -173,9 +173,18 @@ class StepAgain(Evaluator):
 
     @property
     def speeds_of_held(self) -> Array:
-        """Velocities of these at the end of the stage, likewise."""
-        constrained = self.problem.constrained
-        return self._work.end.velocity[constrained.node[constrained.free >= 0]]
+        """Velocities of these at the end of the stage, and what they gain by its length, shape (2, n_held, 3)."""
+        constrained, work = self.problem.constrained, self._work
+        gained = (work.end.velocity - work.origin.velocity) / self.stage.momentum_length
+        return np.stack([work.end.velocity, gained])[:, constrained.node[constrained.free >= 0]]
+
+    @property
+    def momenta_of_bodies(self) -> Array:
+        """Angular momenta of free bodies at the end of the stage, and what they gain by its length, shape (2, n_free,
+        3).
+        """
+        end, origin = self._work.end.angular_momentum, self._work.origin.angular_momentum
+        return np.stack([end, (end - origin) / self.stage.momentum_length])
 
     @property
     def gained_momentum(self) -> Array:
@@ -340,12 +349,15 @@ class StepAgain(Evaluator):
         coupling = step.method.couplings[n + 1, n]
         turned = work.origin.angle + turned / coupling - work.start_angle - guess.total_angle
         shift = body - state.body_position[free] - self.stage.length * step.end.body_velocity[free]
+        along = step.method.along[n + 1] * h if step.method.history else 0.0
+        shift -= along * state.body_velocity[free]
         body = state.body_position[free] + work.origin.body_displacement[free] + shift / coupling
         first = self.places[0].body_rotation
         rotation = np.empty_like(first)
         for f, b in enumerate(free):
             whole = rotation_vector(step.end.body_rotation[b] @ first[f].T)
-            part = (whole - self.stage.length * step.end.body_angular_velocity[b]) / coupling
+            spin = self.stage.length * step.end.body_angular_velocity[b] + along * state.body_angular_velocity[b]
+            part = (whole - spin) / coupling
             rotation[f] = rotation_of(part) @ work.origin.rotation[b]
         return Reached(state.position + work.origin.displacement + moved / coupling, turned, body, rotation)
 

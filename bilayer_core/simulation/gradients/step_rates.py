@@ -27,13 +27,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import sparse
+from scipy.sparse import linalg
 
 from bilayer_core.engine.steps_again import Differences
+from bilayer_core.forces.body_drag import body_flow_of
 from bilayer_core.forces.friction_change import FrozenChange
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.scene.transduction import lagged
-from bilayer_core.simulation.gradients.body_rates import BodyRates
+from bilayer_core.simulation.gradients.body_rates import BodyRates, drag_by_origin
 from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.followed import FOLLOWING, Followed
 from bilayer_core.simulation.gradients.mechanism_rates import resistances, slopes_of_motions
@@ -131,7 +133,10 @@ class Constants:
         self.damping = problem.damping
         self.masses = self._masses(again)
         self.viscous = self._viscous(again)
-        drag = sparse.diags(np.concatenate([np.zeros(self.size), self.viscous, np.zeros(again.wet)]))
+        resisted = sparse.diags(self.viscous) + self._coupling(again)
+        others = (sparse.csr_matrix((of, of)) for of in (self.size, again.wet))
+        drag = sparse.block_diag([next(others), resisted, next(others)])
+        self.apart = self._inverse(resisted.tocsc())
         damped = np.ones(self.masses.shape[0])
         damped[again.of_bodies] = 0.0
         self.dissipation = (self.damping * sparse.diags(damped) @ self.masses + drag).tocsr()
@@ -193,6 +198,34 @@ class Constants:
             found[: len(elements)] = elements
         return found
 
+    def _coupling(self, again: StepAgain) -> sparse.csr_matrix:
+        """Return what viscosity of strips has beside the squares of strains; see `flattening.viscous_coupling`."""
+        problem, found = again.problem, sparse.lil_matrix((self.strains, self.strains))
+        strands, flattening, off_axis = problem.strands, problem.flattening, problem.off_axis
+        bent = {int(k): slope for k, slope in zip(off_axis.joint, off_axis.slope, strict=True)}
+        self.bending: dict[int, list[int]] = {}  # joints that the strain of an edge bends
+        if not (problem.viscosity.exists and flattening.exists):
+            return found.tocsr()
+        for k, coupling in zip(flattening.joint, flattening.coupling, strict=True):
+            lag, turn = coupling * problem.viscosity.joint_time[k, 0], strands.edge_count + 3 * k + 2
+            parts = [(turn - 2, 1.0)]
+            for e, slope in zip((strands.joint_a[k], strands.joint_b[k]), bent.get(int(k), ()), strict=False):
+                if slope != 0.0:
+                    parts.append((e, slope * strands.rest_length[e]))
+                    self.bending.setdefault(int(e), []).append(int(k))
+            for row, weight in parts if lag != 0.0 else ():
+                found[row, turn] += lag * weight
+                found[turn, row] += lag * weight
+        return found.tocsr()
+
+    def _inverse(self, resisted: sparse.csc_matrix) -> sparse.csr_matrix:
+        """Return the inverse for strains that are viscous, and nothing for others."""
+        which = np.flatnonzero(self.viscous > 0.0)
+        chosen = sparse.csr_matrix((np.ones(len(which)), (which, np.arange(len(which)))), (self.strains, len(which)))
+        if not len(which):
+            return sparse.csr_matrix((self.strains, self.strains))
+        return (chosen @ linalg.inv(resisted[which][:, which].tocsc()) @ chosen.T).tocsr()
+
     def _groups(self, again: StepAgain) -> list[list[tuple[int, Array]]]:
         """Return groups of viscous strains that share no unknown, each with the unknowns that it depends on."""
         strands, bonds = again.problem.strands, again.problem.bonds
@@ -201,14 +234,15 @@ class Constants:
         clamped = again.problem.bodies.free_index[constrained.clamp_edge_body]
 
         def of(*which: int, more: Sequence[int] = ()) -> Array:
-            inner = [e for e in which if e < edges]
+            inner = sorted({e for e in which if e < edges})
             nodes = {n for e in inner for n in (strands.edge_node[e], strands.edge_node[e] + 1)} | set(more)
             bodies = {holder[n] for n in nodes if n in holder} | {clamped[e - edges] for e in which if e >= edges}
             bodies = sorted(bodies - {-1})
             parts = self.nodes[sorted(nodes - set(holder))], strands.edge_unknown[inner], again.of_bodies[bodies]
             return np.concatenate([part.ravel() for part in parts]).astype(int)
 
-        seen = [of(e) for e in range(edges)]
+        joints = strands.joint_a, strands.joint_b
+        seen = [of(e, *(joints[s][k] for k in self.bending.get(e, ()) for s in range(2))) for e in range(edges)]
         seen += [of(a, b) for a, b in zip(strands.joint_a, strands.joint_b, strict=True) for _ in range(3)]
         for k in range(len(bonds.joint)):
             seen += [of(strands.joint_a[bonds.joint[k]], strands.joint_b[bonds.joint[k]], more=bonds.node[k])] * 3
@@ -333,6 +367,7 @@ class StepRates:
         )
         self._follower = Followed(model, agains[0])
         self._moving = [n for n in (*FOLLOWING, "inertia", "damping") if n in model.forces]
+        self._body_flow = body_flow_of(model)
         self._resisted = "joint friction" in model.forces
         self._moduli = agains[0].problem.moduli.exists or agains[0].problem.flattening.exists
 
@@ -363,9 +398,6 @@ class StepRates:
         if not (constants.groups or self._resisted):
             return Strains(constants, again, at, None)
         data, rows, columns = [np.zeros(0)], [np.zeros(0, dtype=int)], [np.zeros(0, dtype=int)]
-        if self._resisted:
-            motions = slopes_of_motions(again, at)
-            data, rows, columns = [motions.value], [motions.row], [motions.column]
         again.evaluate(at)
         before, origin = again.whole_gradient(), stage.origin_strain.copy()
         for group in constants.groups:
@@ -375,19 +407,25 @@ class StepRates:
             change = again.whole_gradient() - before
             stage.origin_strain[:] = origin
             for k, seen in group:
-                data.append(change[seen] * (stage.length / (STRAIN * constants.viscous[k])))
+                data.append(change[seen] * (stage.length / STRAIN))
                 rows.append(np.full(len(seen), k))
                 columns.append(seen)
         again.evaluate(at)
         where = np.concatenate(rows), np.concatenate(columns)
         shape = (constants.strains, constants.size)
-        return Strains(constants, again, at, sparse.csr_matrix((np.concatenate(data), where), shape=shape))
+        slopes = constants.apart @ sparse.csr_matrix((np.concatenate(data), where), shape=shape)
+        if self._resisted:
+            slopes = slopes + slopes_of_motions(again, at).matrix()
+        return Strains(constants, again, at, slopes)
 
     def _rates(self, again: StepAgain, n: int, followed: Lacking) -> StageRates:
         constants, stage, at = self.constants, again.stage, again.places[n + 1]
         found = StageRates(stage.length, stage.momentum_length, self._strains(again, at), self._by_laws(again, at))
         if again.of_bodies.size:
             found.bodies = BodyRates(again, at, self.step.method.couplings[n, :n], again.turned[:n])
+            if self.step.method.history:
+                second = again.problem.bodies.second_moment
+                found.bodies.keep(self.step.start, second, self.step.method, n, self.step.length)
         if self._resisted:
             found.resistance = resistances(again)[:, None]
         if constants.in_space:
@@ -397,6 +435,9 @@ class StepRates:
         if followed[0] is not None:
             self._add_followed(found, *followed[:2])
             found.by_director = followed[2]
+        if self._body_flow.exists:
+            drag = drag_by_origin(self._body_flow, again, at)
+            found.by_origin = drag if found.by_origin is None else found.by_origin + drag
         if found.bodies:
             found.bodies.add_slides(again, at, followed[3])
         if again.wet:
@@ -537,6 +578,8 @@ class StepRates:
                 origin_speed += method.momenta[n] * h * push
             if bodies := stage.bodies:
                 bodies.turn_origin(first, origin, turned)
+                if method.history:
+                    bodies.turn_by_history(first, speed, push, origin)
                 ahead = bodies.predict(origin, origin_speed)
             reached = stage.lag[0][:, None] * start.reached
             if len(constants.channel):
@@ -546,11 +589,11 @@ class StepRates:
             change = change / (stage.length * stage.momentum_length) - constants.dissipation @ origin / stage.length
             change[constants.of_strains] -= stage.resistance * origin[constants.of_strains] / stage.length
             right = change[:size] + stage.strains.pull_back(change[constants.of_strains])
+            if stage.momentum:
+                right -= origin_speed[fluid] / stage.momentum_length
             if bodies:
                 right = bodies.gather(right)
                 bodies.push(ahead, right)
-            if stage.momentum:
-                right -= origin_speed[fluid] / stage.momentum_length
             if len(stage.law_by_gain):
                 laws = stage.law_by_mode @ reached + stage.law_by_gain[:, None] * acts.gain
                 right += stage.by_laws @ laws
@@ -637,7 +680,7 @@ class StepRates:
             if bodies:
                 ahead += bodies.push_back(right)
             if stage.momentum:
-                origin_speeds[n][fluid] -= right / stage.momentum_length
+                origin_speeds[n][fluid] -= spread / stage.momentum_length
             of_mass = constants.masses @ change / (stage.length * stage.momentum_length)
             origins[n] -= of_mass + constants.dissipation @ change / stage.length
             origins[n][constants.of_strains] -= stage.resistance * change[constants.of_strains] / stage.length
@@ -672,6 +715,8 @@ class StepRates:
                     start.place += of_start
             if bodies:
                 bodies.predict_back(origins[n], origin_speeds[n], ahead)
+                if method.history:
+                    bodies.turn_by_history_back(first, speed, push, origins[n])
                 bodies.turn_origin_back(first, origins[n], ends, origins)
             if method.history:
                 speed += method.along[n] * h * origins[n]

@@ -161,6 +161,8 @@ LEVEL, GAIN = "stimuli.swelling.schedule.to", f"{ACTIVE}.eigenstrain.gain"
 SWELLING = HANGING | {LEVEL: 0.8}
 VISCOUS = {"materials.active.retardation_time": 0.05}
 EULER = {"solver.integrator": "implicit_euler", "solver.dt": 0.004, "solver.tolerance": None}
+STRIDE = {"stimuli.humidity.schedule.period": 0.4}
+GRIP = EULER | {"solver.dt": 0.001, "stimuli.humidity.schedule.start": 0, "stimuli.humidity.schedule.end": 0.05}
 RUNS: dict[str, tuple[Any, ...]] = {
     "stimulus": ("bending", SWELLING, 0.2, LEVEL),
     "gain in space": ("bending", SWELLING | IN_SPACE, 0.2, GAIN),
@@ -168,6 +170,8 @@ RUNS: dict[str, tuple[Any, ...]] = {
     "thickness": ("bending", SWELLING, 0.2, f"{ACTIVE}.thickness"),
     "length, implicit euler": ("bending", SWELLING | EULER, 0.1, "rods.strip.path.length", "com", 1e-5),
     "viscosity": ("bending", SWELLING | VISCOUS, 0.2, "materials.active.retardation_time"),
+    "hinges/density": ("arch", {}, 0.005, "materials.passive.density"),
+    "starts at rest/gain": ("bending", SWELLING | {"start": "settle"}, 0.05, GAIN),
     "fibres/gravity": ("chiral_pod", {}, 0.02, "gravity.2"),
     "swimmer/density of the fluid": ("swimming", {}, 0.01, "fluid.density"),
     "added mass/density of the fluid": ("flagellum", {}, 0.05, "fluid.density"),
@@ -178,6 +182,8 @@ RUBBING: dict[str, tuple[Any, ...]] = {
     "inchworm/friction": ("crawling_inchworm", {}, 0.05, "contact.friction.forward"),
     "knot/density": ("knot", {}, 0.005, "materials.rubber.density"),
     "jumper/gravity": ("jumping", {}, 0.03, "gravity.2"),
+    "walker/friction": ("crawling_dual_leg", STRIDE, 0.002, "contact.friction.backward"),
+    "grip/gain": ("gripping", GRIP, 0.055, "rods.arm.layers.active.eigenstrain.gain"),
 }
 CASES = (
     *(Case(f"gradients/runs/{name}", "differences of runs", 1e-6, end_of_run(*of)) for name, of in RUNS.items()),
