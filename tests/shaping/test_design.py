@@ -59,6 +59,15 @@ def test_one_pattern_serves_two_shapes_at_two_stimuli():
     assert len(found.shapes) == 2
 
 
+@pytest.mark.parametrize("kind", [HANGING | {"rods.strip.width": 2e-3}, {"rods.strip.width": 10e-3}])
+def test_a_film_that_sags_or_curls_across_on_the_way_becomes_a_u(kind):
+    turn = math.pi * np.clip(np.linspace(-1.0, 2.0, 120), 0.0, 1.0)
+    steps = np.stack([np.cos(turn), 0.0 * turn, np.sin(turn)], axis=1) * LENGTH / 119
+    thin = {f"rods.strip.layers.{layer}.thickness": 0.2e-3 for layer in ("passive", "active")}
+    found = design("bending", np.cumsum(steps, axis=0), {GAIN: (-0.2, 0.2, 30)}, overrides=kind | thin)
+    assert found.rms < 2e-4
+
+
 def test_bounds_that_limit_a_shape_are_reported_with_the_distance():
     profile = {"at": [0, 0.1], "value": [0.03, 0.03]}
     found = design("bending", curve_of({GAIN: profile}), {GAIN: (-0.01, 0.01, 10)})
