@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 
 import numpy as np
 import pytest
@@ -166,10 +167,17 @@ def straight(length, direction=(1.0, 0.0, 0.0)):
     return np.linspace(0.0, length, 20)[:, None] * np.array(direction)
 
 
+def aside(radius):
+    turn = np.linspace(0.0, 1.0, 20)
+    return radius * np.stack([np.sin(turn), 1.0 - np.cos(turn), 0.0 * turn], axis=1)
+
+
 @pytest.mark.parametrize(
     ("target", "vary", "message"),
     [
-        (straight(0.2), {GAIN: (-0.1, 0.1)}, "is 200 mm long, the rod 100.5 mm; .* cannot stretch so far"),
+        (straight(0.2), {GAIN: (-0.1, 0.1)}, "is 200 mm long; .* the rod becomes 95 to 105 mm long"),
+        (straight(0.05), {GAIN: (-0.1, 0.1)}, "is 50 mm long; .* the rod becomes 95 to 105 mm long"),
+        (aside(0.1), {GAIN: (-0.1, 0.1)}, "leaves its plane by 45.97 mm, in which the rod stays"),
         (straight(0.1, (0.0, 0.0, 1.0)), {GAIN: (-0.1, 0.1)}, "begins 90° from the direction in which the rod begins"),
         (straight(0.1), {"rods.strip.width": (1e-3, 2e-3)}, "vary rods.strip.width: acts on nothing"),
         (straight(0.1), {}, "vary: nothing is given"),
@@ -180,6 +188,11 @@ def straight(length, direction=(1.0, 0.0, 0.0)):
             straight(0.1),
             [f"{GAIN}=0:1%:5", f"{GAIN}=0:2%:5"],
             "vary rods.strip.layers.active.eigenstrain.gain: is given twice",
+        ),
+        (
+            [straight(0.1)],
+            [f"{GAIN}=0:1%:5", "rods.0.layers.1.eigenstrain.gain=0:2%:5"],
+            "twice, as rods.strip.layers.a",
         ),
         (straight(0.1), [f"{GAIN}=1%,1%:9"], "a palette must have two values or more"),
         (straight(0.1), [f"{GAIN}=1%,thick:9"], "gain: .*thick"),
@@ -198,6 +211,11 @@ def test_bad_input_of_a_design_is_refused(target, vary, message):
 def test_a_smoothness_that_is_no_weight_is_refused(smoothness):
     with pytest.raises(InputError, match="smoothness: .* must be a finite number from 0 up"):
         design("bending", straight(0.1), {GAIN: (-0.1, 0.1)}, smoothness=smoothness)
+
+
+def test_a_direction_in_which_nothing_moves_the_rod_is_named():
+    found = design("bending", aside(0.1), {GAIN: (-0.1, 0.1)}, overrides={"solver.dimension": 3})
+    assert re.search(r"unreachable: \d\d.* mm along \(0, 1, 0\)", found.termination)
 
 
 def test_two_shapes_at_the_same_stimuli_are_refused():

@@ -55,11 +55,15 @@ TURN = 1.0
 STEEPEST = math.radians(10.0)
 """Between the clamp and the start of a wanted curve."""
 LONGEST = 1.1
-"""Length of a wanted curve, of what the rod can become."""
+"""Length of a wanted curve, of the longest rod within the bounds; that of the shortest, of a wanted curve."""
+ASIDE = 0.05
+"""Of its length: by how much a curve may leave its plane where the rod stays in one."""
 CLOSE = 1e-3
 """Root mean square of distances, of the length of the rod, from which on no other way is tried."""
 ASTRAY, SHORTEST = 0.2, 1.0 / 64.0
 """Largest error of linear equations about a step, of what it was to mend, and the shortest step, of the whole way."""
+FIXED = 1e-9
+"""Motion of the rod along one direction, of that along another, that is none."""
 AT_BOUND = 1e-6
 """Part of the way between bounds."""
 
@@ -148,9 +152,10 @@ class _Search:
         self._here = self._built(self._values)
         self._nodes = self._strands()
         self._size = float(np.linalg.norm(np.diff(self._curve(self._here[0]), axis=0), axis=1).sum())
-        self._targets = [self._placed(curve, here) for curve, here in zip(curves, self._here, strict=True)]
         self._parameters = [self._sought(here) for here in self._here]
         self._by_laws = self._are_laws()
+        self._refuse_idle()
+        self._targets = [self._placed(*of) for of in zip(curves, self._here, self._slopes(), strict=True)]
 
     def _built(self, values: Array, shapes: Sequence[Equilibrium] = ()) -> list[Equilibrium]:
         """Return the equilibria of the scene with such values, one for each target, near some shapes."""
@@ -210,7 +215,7 @@ class _Search:
             self._known = [self._derivatives(*of) @ acts for of in zip(self._here, self._parameters, strict=True)]
         return self._known
 
-    def _placed(self, curve: TargetCurve, here: Equilibrium) -> TargetCurve:
+    def _placed(self, curve: TargetCurve, here: Equilibrium, slopes: Array) -> TargetCurve:
         """Return a target, moved to where the rod begins."""
         made, first = self._curve(here), [nodes.start for nodes in self._nodes]
         start = here.model.start_position
@@ -222,11 +227,25 @@ class _Search:
                 f"{curve.source}: begins {math.degrees(angle):.3g}° from the direction in which the rod begins, which "
                 f"is {', '.join(f'{x:.3g}' for x in way)}; allowed are {math.degrees(STEEPEST):g}°: turn the curve"
             )
-        if curve.length > LONGEST * self._size:
+        edges = np.diff(made, axis=0)
+        lengths = np.linalg.norm(edges, axis=1)
+        growth = np.einsum(
+            "ia,iak->k", edges / lengths[:, None], np.diff(slopes, axis=0)
+        )  # of the length by each value
+        ends = np.array([self._pattern.low, self._pattern.high]) - self._values
+        least, most = lengths.sum() + (np.sort(growth * ends, axis=0) @ np.ones(len(growth)))
+        if not least / LONGEST <= curve.length <= LONGEST * most:
             raise InputError(
-                f"{curve.source}: is {1e3 * curve.length:.4g} mm long, the rod {1e3 * self._size:.4g} mm; allowed are "
-                f"{LONGEST:g} times its length: it cannot stretch so far"
+                f"{curve.source}: is {1e3 * curve.length:.4g} mm long; within these bounds the rod becomes "
+                f"{1e3 * least:.4g} to {1e3 * most:.4g} mm long, and allowed are {LONGEST:g} times more and less"
             )
+        if self._in_plane:
+            aside = np.ptp(curve.points @ np.cross(*here.model.rods.axes))
+            if aside > ASIDE * curve.length:
+                raise InputError(
+                    f"{curve.source}: leaves its plane by {1e3 * aside:.4g} mm, in which the rod stays; allowed are "
+                    f"{100.0 * ASIDE:g} % of its length: let the rod twist, as fibres at an angle do"
+                )
         return TargetCurve(curve.points + (made[0] - curve.at(np.zeros(1))[0]), curve.source)
 
     def _go(self, values: Array) -> None:
@@ -353,7 +372,6 @@ class _Search:
 
     def result(self) -> DesignResult:
         """Search, and return what was found."""
-        self._refuse_idle()
         termination = self._search()
         for _ in range(MOST_MODELS):
             scene = load_content(scene_content(self._scene), self._changes(self._values))
@@ -365,7 +383,7 @@ class _Search:
             self._parameters = [self._sought(here) for here in self._here]
             self._by_laws = self._are_laws()
             termination = self._found()
-        return self._report(termination, simulator)
+        return self._report(termination + self._out_of_reach(), simulator)
 
     def _search(self) -> str:
         """Go to the best pattern, and return why the search ended there.
@@ -457,11 +475,20 @@ class _Search:
 
     def _refuse_idle(self) -> None:
         moved = np.max([np.abs(slopes).max(axis=(0, 1)) for slopes in self._slopes()], axis=0)
-        largest = moved * (self._pattern.high - self._pattern.low)
-        if idle := [
-            name for name, of in zip(self._names, largest[self._owner], strict=True) if of < 1e-12 * self._size
-        ]:
-            raise InputError(f"vary {', '.join(idle[:4])}: acts on nothing at these stimuli; leave it out")
+        acts = self._pattern.split(moved * (self._pattern.high - self._pattern.low) >= 1e-12 * self._size)
+        if idle := [v.path for v, own in zip(self._varied, acts, strict=True) if not own.any()]:
+            raise InputError(f"vary {', '.join(idle)}: acts on nothing at these stimuli; leave it out")
+
+    def _out_of_reach(self) -> str:
+        """Return along which direction nothing moves the rod though it is away from a target, as a text."""
+        for (away, _), slopes in zip(self._departures(self._targets), self._slopes(), strict=True):
+            moved = slopes.swapaxes(1, 2).reshape(-1, 3)
+            _, sizes, ways = np.linalg.svd(moved, full_matrices=False)
+            missed = float(np.abs(away @ ways[2]).max())
+            if sizes[2] < FIXED * sizes[0] and missed > CLOSE * self._size:
+                way = ", ".join(f"{abs(x):.3g}" for x in ways[2])
+                return f"; unreachable: {1e3 * missed:.3g} mm along ({way}), where nothing that varies moves the rod"
+        return ""
 
     def _report(self, termination: str, simulator: Simulator) -> DesignResult:
         scene, shapes = simulator.scene, []

@@ -102,14 +102,17 @@ def read_varied(scene: SceneConfig, asked: Vary) -> tuple[SceneConfig, list[Vari
     if not given:
         raise InputError(f"vary: nothing is given; each {FORM}")
     found: list[Varied] = []
+    places: dict[tuple[int, Any], str] = {}
+    original = scene_content(scene)
     for path, ends, points in given:
-        if path in [v.path for v in found]:
-            raise InputError(f"vary {path}: is given twice")
         content = scene_content(scene)
         try:
-            holder, place = read_overrides({path: 0.0})[0].find(content)
+            holder, place = read_overrides({path: 0.0})[0].find(original)
         except SceneError as error:
             raise SceneError(f"vary {path}: {str(error).partition(': ')[2]}") from error
+        if (id(holder), place) in places:
+            raise InputError(f"vary {path}: is given twice, as {places[id(holder), place]} before")
+        places[id(holder), place] = path
         held, profile = holder[place], None
         if isinstance(held, dict) and held.keys() == {"at", "value"}:
             profile = held
