@@ -199,6 +199,7 @@ def aside(radius):
         (straight(0.1), [f"{GAIN}=1%,2%:9:3"], "must be PATH=LO:HI, .* or PATH=V,V,…:PIECES"),
         (straight(0.1), {"gravity.2": (-1.0, 1.0, 5)}, "points need a number of a rod"),
         (straight(0.1), {"rods.strip.layers.active.gain": (0, 1)}, "vary rods.strip.layers.active.gain: there is no"),
+        (straight(0.1), {"rods.strip.path.length": (0.1, 0.2, 5)}, "cannot vary along the rod, leave out :5: "),
         ([straight(0.1)] * 2, {GAIN: (-0.1, 0.1)}, "2 curves need values of stimuli each, 0 are given"),
     ],
 )
@@ -211,6 +212,11 @@ def test_bad_input_of_a_design_is_refused(target, vary, message):
 def test_a_smoothness_that_is_no_weight_is_refused(smoothness):
     with pytest.raises(InputError, match="smoothness: .* must be a finite number from 0 up"):
         design("bending", straight(0.1), {GAIN: (-0.1, 0.1)}, smoothness=smoothness)
+
+
+def test_a_rod_that_nothing_holds_is_refused():
+    with pytest.raises(InputError, match="begin where the rod does, which nothing holds: clamp_start"):
+        design("bending", straight(0.1), {GAIN: (-0.1, 0.1, 3)}, overrides={"rods.strip.clamp_start": None})
 
 
 def test_a_direction_in_which_nothing_moves_the_rod_is_named():

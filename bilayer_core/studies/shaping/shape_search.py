@@ -196,6 +196,11 @@ class _Search:
     def _strands(self) -> list[slice]:
         """Return the nodes of the strands of the rod; two of them have its curve between them."""
         name, strands = rod_of(self._scene, self._varied), self._here[0].model.strands
+        rod = next(rod for rod in self._scene.rods if name in rod.copy_names)
+        if not (rod.clamp_start or any(variant.clamp_start for variant in rod.variants)):
+            raise InputError(
+                f"rods.{rod.name}: wanted curves begin where the rod does, which nothing holds: clamp_start"
+            )
         found = [slice(s.first_node, s.first_node + s.shown) for s in strands if s.rod == name]
         return found if len({s.stop - s.start for s in found}) == 1 else found[:1]
 

@@ -127,7 +127,11 @@ def read_varied(scene: SceneConfig, asked: Vary) -> tuple[SceneConfig, list[Vari
             start = start[::2] if palette else start
         start = np.clip(start.astype(float), low, high)
         found.append(Varied(path, low, high, tuple(at), start, palette))
-        scene = load_content(scene_content(scene), found[-1].changes(start))
+        try:
+            scene = load_content(scene_content(scene), found[-1].changes(start))
+        except SceneError as error:
+            along = f"cannot vary along the rod, leave out :{points}: " if at and profile is None else ""
+            raise SceneError(f"vary {path}: {along}{str(error).partition(': ')[2]}") from error
     return scene, found
 
 
