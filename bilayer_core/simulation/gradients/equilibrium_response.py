@@ -185,16 +185,24 @@ class Equilibrium:
         SimulationError
             If there is none; nothing is changed then.
         """
-        before, state = self._gains.copy(), self._state.copy()
+        before = self.kept()
         try:
             self._gains[:] = gains
             put_gains(self.model, gains)
             solve_static(self._stepper, self._state)
             self._settle()
         except SimulationError:
-            self._gains[:], self._state = before, state
-            self._settle()
+            self.return_to(before)
             raise
+
+    def kept(self) -> tuple[Array, State]:
+        """Return gains and shape for `return_to`."""
+        return self._gains.copy(), self._state.copy()
+
+    def return_to(self, kept: tuple[Array, State]) -> None:
+        """Go back to gains and the equilibrium that was found with them."""
+        self._gains[:], self._state = kept[0], kept[1].copy()
+        self._settle()
 
     def velocities(self, parameters: Sequence[Parameter]) -> Array:
         """Return dx/dp of nodes by each parameter from one difference each: exact where forces are linear in it, as in
