@@ -67,10 +67,11 @@ docs: $(TESTS)  ## Build the site of the pages: build/site.
 evidence: $(TESTS)  ## Compute all cases with a known answer, about 20 minutes; `make docs` shows the tables.
 	$(BIN)/bilayer validate --out runs/validation
 
-# The commands are those of the page.
+# The commands and the program are those of the page.
 gallery: $(STAMP)  ## Draw the pictures and films of docs/gallery.md anew.
 	mkdir -p runs/gallery
-	sed -n 's/^bilayer \(run\|render\) .*/& --force/p' docs/gallery.md > runs/gallery/commands.sh
+	sed -n '/^```python$$/,/^```$$/{//!p}' docs/gallery.md > runs/gallery/letters.py
+	sed -n '/^python /p; s/^bilayer \(run\|render\) .*/& --force/p' docs/gallery.md > runs/gallery/commands.sh
 	cd runs/gallery && PATH="$(CURDIR)/$(BIN):$$PATH" sh -e commands.sh
 	cp runs/gallery/*.png runs/gallery/*.webp docs/images/gallery/
 

@@ -66,7 +66,7 @@ class Collected:
         for number, (at, *others) in enumerate(self.laws if not (alone or of_point) else ()):
             if self.fields[at] == followed and tuple(others) == laws[0]:
                 return number, number + 1 if response.gradient else -1
-        shared = (response.gradient or of_point) and not alone and followed in self.fields
+        shared = not alone and followed in self.fields
         field = self.fields.index(followed) if shared else len(self.fields)
         if not shared:
             self.fields.append(followed)

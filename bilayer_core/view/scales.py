@@ -15,7 +15,6 @@ SMALLEST_SIZE = 1e-9  # of a robot [m]
 ARROW_SHARE = 0.25  # length of the arrow of the reference force, in sizes of the robot
 SHOWN_SHARE = 0.005  # forces below this share of the reference force have no arrow
 VIEW_DIRECTION = np.array([0.62, -0.72, 0.30])  # from what is looked at to the eye
-SHOWN_SLOPE = 0.52  # tangent of the angle over and under the line of sight that the viewer shows
 VIEW_SLOPE = 0.44  # the part of it that is filled
 VIEW_ASPECT = 1.5  # width of the view over its height
 ROOM = 1.15  # times as far as rods alone ask for: bodies and arrows are beside them

@@ -148,6 +148,14 @@ def test_middle_lines_move_with_the_layers_that_they_are_the_middle_of(model):
     assert error(found[of[0], THICKNESS], reference) < 1e-6
 
 
+def test_a_rod_that_is_put_elsewhere_moves_as_a_whole():
+    simulator = at_rest("bending", {}, SWOLLEN)
+    found = simulator.gradient("rod/strip/position", "rods.strip.path.start")[
+        "rod/strip/position", "rods.strip.path.start"
+    ]
+    np.testing.assert_allclose(found, np.broadcast_to(np.eye(3), found.shape), atol=1e-9)
+
+
 def test_a_list_of_numbers_gives_a_column_for_each():
     profile = {"at": [0.0, 0.1], "value": [1e-3, 1e-3]}
     scene = HANGING | {THICKNESS: profile}
@@ -185,6 +193,7 @@ def test_an_unstable_equilibrium_is_refused():
         ("com", "rods.strip.stations", "rods.strip.stations is a whole number"),
         ("com", "name", "name is no number in this scene"),
         ("com", "materials.active.poisson_ratio", "cannot be varied about its value, to 0.50025: .*at most 0.5"),
+        ("com", "rods.strip.path.direction.1", "direction.1 turns the plane in which this model moves"),
     ],
 )
 def test_what_has_no_derivative_is_refused_by_name(of, to, message):

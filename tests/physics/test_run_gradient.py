@@ -280,6 +280,28 @@ def test_no_room_for_states_is_refused(room):
         Simulator("bending").run(1e-2, gradients=room)
 
 
+def test_a_run_with_other_numbers_goes_where_derivatives_say():
+    simulator = Simulator(load_scene("bending"))
+    simulator.run(0.05)
+    simulator.set_stimulus("swelling", 0.3)
+    found = simulator.run(0.1, gradients=True).gradient(["com", "rod/strip/position"], GAIN)
+    assert set(found.off) == {"com", "rod/strip/position"} and max(found.off.values()) < 0.1
+
+
+def test_derivatives_of_a_run_by_leaps_are_told_to_be_useless():
+    result = Simulator(load_scene("jumping")).run(0.05, gradients=True)
+    with pytest.warns(RuntimeWarning, match=r"gravity.2 at -9.9 in place of -10, .* % apart\): it goes by leaps"):
+        assert result.gradient("com", "gravity.2").off["com"] > 0.5
+
+
+def test_layers_with_equal_gains_have_derivatives_of_their_own():
+    simulator = Simulator(load_scene("chiral_pod"))
+    result = simulator.run(0.05, gradients=True)
+    layers = [f"rods.valve.layers.{name}.eigenstrain.gain" for name in ("inner", "outer")]
+    one, other = (result.gradient("com", of)["com", of] for of in layers)
+    assert np.abs(one - other).max() > 0.1 * np.abs(one).max()
+
+
 def test_a_motion_that_forgets_its_start_is_told():
     simulator, result = kept_run("bending", HANGING, 0.05)
     seeds = {"positions": np.ones((simulator.model.node_count, 3))}
@@ -314,6 +336,8 @@ def test_a_run_that_begins_elsewhere_begins_there_whatever_the_numbers_are():
         ("bending", {"bodies.wall.motion": SPINNING, "start": "settle"}, GAIN, "settles and then moves"),
         ("bending", {}, "swelling", "a number of its schedule"),
         ("bending", {}, "contact.stiffness", "contact"),
+        ("bending", {}, "rods.strip.path.start.1", "turns or moves the plane"),
+        ("swimming", {}, "bodies.hub.position.0", "where its guide or joint does not let it go"),
     ],
 )
 def test_what_runs_are_not_differentiated_through_or_by_is_refused_by_name(name, overrides, to, told):

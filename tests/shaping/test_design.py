@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 
 import numpy as np
 import pytest
@@ -57,6 +58,15 @@ def test_one_pattern_serves_two_shapes_at_two_stimuli():
     found = design("bending", curves, {GAIN: (-0.05, 0.05, 3)}, at=levels, overrides=HANGING)
     assert found.values[0] == pytest.approx(profile["value"], abs=1e-4)
     assert len(found.shapes) == 2
+
+
+@pytest.mark.parametrize("kind", [HANGING | {"rods.strip.width": 2e-3}, {"rods.strip.width": 10e-3}])
+def test_a_film_that_sags_or_curls_across_on_the_way_becomes_a_u(kind):
+    turn = math.pi * np.clip(np.linspace(-1.0, 2.0, 120), 0.0, 1.0)
+    steps = np.stack([np.cos(turn), 0.0 * turn, np.sin(turn)], axis=1) * LENGTH / 119
+    thin = {f"rods.strip.layers.{layer}.thickness": 0.2e-3 for layer in ("passive", "active")}
+    found = design("bending", np.cumsum(steps, axis=0), {GAIN: (-0.2, 0.2, 30)}, overrides=kind | thin)
+    assert found.rms < 2e-4
 
 
 def test_bounds_that_limit_a_shape_are_reported_with_the_distance():
@@ -157,10 +167,17 @@ def straight(length, direction=(1.0, 0.0, 0.0)):
     return np.linspace(0.0, length, 20)[:, None] * np.array(direction)
 
 
+def aside(radius):
+    turn = np.linspace(0.0, 1.0, 20)
+    return radius * np.stack([np.sin(turn), 1.0 - np.cos(turn), 0.0 * turn], axis=1)
+
+
 @pytest.mark.parametrize(
     ("target", "vary", "message"),
     [
-        (straight(0.2), {GAIN: (-0.1, 0.1)}, "is 200 mm long, the rod 100.5 mm; .* cannot stretch so far"),
+        (straight(0.2), {GAIN: (-0.1, 0.1)}, "is 200 mm long; .* the rod becomes 95 to 105 mm long"),
+        (straight(0.05), {GAIN: (-0.1, 0.1)}, "is 50 mm long; .* the rod becomes 95 to 105 mm long"),
+        (aside(0.1), {GAIN: (-0.1, 0.1)}, "leaves its plane by 45.97 mm, in which the rod stays"),
         (straight(0.1, (0.0, 0.0, 1.0)), {GAIN: (-0.1, 0.1)}, "begins 90° from the direction in which the rod begins"),
         (straight(0.1), {"rods.strip.width": (1e-3, 2e-3)}, "vary rods.strip.width: acts on nothing"),
         (straight(0.1), {}, "vary: nothing is given"),
@@ -172,11 +189,17 @@ def straight(length, direction=(1.0, 0.0, 0.0)):
             [f"{GAIN}=0:1%:5", f"{GAIN}=0:2%:5"],
             "vary rods.strip.layers.active.eigenstrain.gain: is given twice",
         ),
+        (
+            [straight(0.1)],
+            [f"{GAIN}=0:1%:5", "rods.0.layers.1.eigenstrain.gain=0:2%:5"],
+            "twice, as rods.strip.layers.a",
+        ),
         (straight(0.1), [f"{GAIN}=1%,1%:9"], "a palette must have two values or more"),
         (straight(0.1), [f"{GAIN}=1%,thick:9"], "gain: .*thick"),
         (straight(0.1), [f"{GAIN}=1%,2%:9:3"], "must be PATH=LO:HI, .* or PATH=V,V,…:PIECES"),
         (straight(0.1), {"gravity.2": (-1.0, 1.0, 5)}, "points need a number of a rod"),
         (straight(0.1), {"rods.strip.layers.active.gain": (0, 1)}, "vary rods.strip.layers.active.gain: there is no"),
+        (straight(0.1), {"rods.strip.path.length": (0.1, 0.2, 5)}, "cannot vary along the rod, leave out :5: "),
         ([straight(0.1)] * 2, {GAIN: (-0.1, 0.1)}, "2 curves need values of stimuli each, 0 are given"),
     ],
 )
@@ -189,6 +212,16 @@ def test_bad_input_of_a_design_is_refused(target, vary, message):
 def test_a_smoothness_that_is_no_weight_is_refused(smoothness):
     with pytest.raises(InputError, match="smoothness: .* must be a finite number from 0 up"):
         design("bending", straight(0.1), {GAIN: (-0.1, 0.1)}, smoothness=smoothness)
+
+
+def test_a_rod_that_nothing_holds_is_refused():
+    with pytest.raises(InputError, match="begin where the rod does, which nothing holds: clamp_start"):
+        design("bending", straight(0.1), {GAIN: (-0.1, 0.1, 3)}, overrides={"rods.strip.clamp_start": None})
+
+
+def test_a_direction_in_which_nothing_moves_the_rod_is_named():
+    found = design("bending", aside(0.1), {GAIN: (-0.1, 0.1)}, overrides={"solver.dimension": 3})
+    assert re.search(r"unreachable: \d\d.* mm along \(0, 1, 0\)", found.termination)
 
 
 def test_two_shapes_at_the_same_stimuli_are_refused():

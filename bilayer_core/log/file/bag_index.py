@@ -15,7 +15,7 @@ import numpy as np
 from bilayer_core.log.file.bag_files import BagFiles
 from bilayer_core.log.file.frame_matching import match_frames
 from bilayer_core.log.messages.cdr import HEADER, NANOSECONDS
-from bilayer_core.log.messages.topics import DESCRIPTION, EVENTS, MULTI_ARRAY, Rate, output_topics
+from bilayer_core.log.messages.topics import DESCRIPTION, EVENTS, MULTI_ARRAY, output_topics
 from bilayer_core.names import is_name
 from bilayer_core.observed.frame import BodyInfo, Description
 
@@ -50,7 +50,6 @@ _SPECS = [spec for spec in output_topics(_ANY) if spec.name not in UNREAD]
 _TYPES = {spec.name.partition("/")[0]: spec.type for spec in (*_SPECS, EVENTS, DESCRIPTION)}
 """Kind of topic, such as ``body_pose``, to ROS type."""
 _OF_BODIES = {spec.name.partition("/")[0] for spec in _SPECS if "/" in spec.name}
-_OF_FRAMES = {spec.name.partition("/")[0] for spec in _SPECS if spec.rate is Rate.OUTPUT}
 
 
 def split_topic(topic: str, ros_type: str) -> tuple[str, str] | None:

@@ -137,6 +137,13 @@ class Course:
                 maker.make_again(state, time, stood_in)
             yield KeptStep(start, state, self._method(stood_in), span.spread[k])
 
+    def repeat(self, maker: Stepper, state: State) -> None:
+        """Make all steps from another state, with what was set from outside."""
+        for span in self._spans:
+            _set_outside(state, span.outside)
+            for time, stood_in in zip(span.ends, span.stood_in, strict=True):
+                maker.make_again(state, time, stood_in)
+
     def _method(self, stood_in: bool) -> Method:
         return self._stepper.engine.methods[-1 if stood_in else 0]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,11 +38,15 @@ class Gradient(Mapping[tuple[str, str], Array]):
         Likewise, the size of the error: by how much the last correction changed each value.
     residual : float
         Largest displacement that Newton's method still made at the equilibrium before it was differentiated [m].
+    off : dict
+        Of a run, by quantity: difference between the derivatives and one more run with all numbers changed by a
+        hundredth of their size, over the larger of both. Much of it is told by a warning.
     """
 
     derivatives: dict[tuple[str, str], Array]
     errors: dict[tuple[str, str], Array]
     residual: float
+    off: dict[str, float] = field(default_factory=dict)
 
     def __getitem__(self, key: tuple[str, str]) -> Array:
         return self.derivatives[key]
@@ -149,10 +153,11 @@ class DifferentiableRun:
         run = self.response()
         wanted, numbers = _known(run, of), run.numbers(_listed(to))
         each = [number for of_name in numbers.values() for number in of_name]
-        along, found, k = run.forward(each), {}, 0
+        along, found, tried = run.forward(each), {}, []
         for name, of_name in numbers.items():
             found[name] = []
             for number in of_name:
+                k = len(tried)
                 slopes, errors = run.values(number, along, k, wanted)
                 if not any(np.any(slope != 0.0) for slope in slopes) and not np.any(along.place[:, k]):
                     raise InputError(
@@ -160,8 +165,11 @@ class DifferentiableRun:
                         f"{', '.join(wanted)} depends on it; leave it out"
                     )
                 found[name].append((number.path, list(zip(slopes, errors, strict=True))))
-                k += 1
-        return _gathered(wanted, found, run.residual)
+                tried.append((number, slopes))
+        from bilayer_core.simulation.gradients.trial import try_derivatives
+
+        off = try_derivatives(run, self._course, self._builders, self._description, wanted, tried)
+        return replace(_gathered(wanted, found, run.residual), off=off)
 
     def pull_back(self, seeds: Mapping[str, Array], to: str | Sequence[str]) -> dict[str, Array]:
         """Return the derivatives of Σ seed · quantity; see `RunResult.pull_back`."""

@@ -36,6 +36,7 @@ from bilayer_core.simulation.gradients.nearby import (
     Nearby,
     carry_directors,
     known_quantities,
+    refuse_other_plane,
     slope,
 )
 from bilayer_core.simulation.gradients.parameters import (
@@ -184,16 +185,24 @@ class Equilibrium:
         SimulationError
             If there is none; nothing is changed then.
         """
-        before, state = self._gains.copy(), self._state.copy()
+        before = self.kept()
         try:
             self._gains[:] = gains
             put_gains(self.model, gains)
             solve_static(self._stepper, self._state)
             self._settle()
         except SimulationError:
-            self._gains[:], self._state = before, state
-            self._settle()
+            self.return_to(before)
             raise
+
+    def kept(self) -> tuple[Array, State]:
+        """Return gains and shape for `return_to`."""
+        return self._gains.copy(), self._state.copy()
+
+    def return_to(self, kept: tuple[Array, State]) -> None:
+        """Go back to gains and the equilibrium that was found with them."""
+        self._gains[:], self._state = kept[0], kept[1].copy()
+        self._settle()
 
     def velocities(self, parameters: Sequence[Parameter]) -> Array:
         """Return dx/dp of nodes by each parameter from one difference each: exact where forces are linear in it, as in
@@ -223,6 +232,7 @@ class Equilibrium:
     def _with(self, path: str, value: float) -> Nearby:
         """Return the model with another number in its scene."""
         model = self._builders.model_of(scene_with(self.scene, path, value))
+        refuse_other_plane(self.model, model, path)
         stepper = self._builders.stepper_of(model)
         state = self._carried(model)
         if state is None:
@@ -324,7 +334,7 @@ class Equilibrium:
         for _ in range(MOST if moves else 0):
             shapes = [of.moved(motion * (place * h)) for of, place in zip(nearby, PLACES, strict=True)]
             correction = self._solved(slope([of.gradient(s) for of, s in zip(nearby, shapes, strict=True)], h))
-            part = self.displacement(correction) / self.displacement(motion)
+            part = h * self.displacement(correction) / travel
             if not part < before:
                 break
             motion, before = motion + correction, part

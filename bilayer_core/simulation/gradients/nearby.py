@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from bilayer_core.engine.evaluator import Evaluator
+from bilayer_core.errors import InputError
 from bilayer_core.log.run.frame_values import FrameValues
 from bilayer_core.log.run.quantities import entries
 from bilayer_core.model.lit_elements import light_of, part_seen
@@ -29,6 +30,8 @@ LENGTH = 1e3
 """Over which inertia acts [s]: it keeps what nothing holds from drifting, and corrections take it out again."""
 PLACES = (-1.0, -0.5, 0.5, 1.0)
 """Of a step h of a parameter, where models are looked at: for differences of fourth order."""
+SAME_PLANE = 1e-12
+"""Difference of the normals of two planes that are one."""
 
 
 def slope(values: Sequence[Any], h: float) -> Any:
@@ -43,6 +46,21 @@ class Builders:
     model_of: Callable[[SceneConfig], Model]
     stepper_of: Callable[[Model], Stepper]
     state_of: Callable[[Model], State]
+
+
+def refuse_other_plane(model: Model, other: Model, path: str, moves: bool = True) -> None:
+    """Refuse a number that turns the plane of a model of dimension 2, in which its unknowns are, and one that moves it
+    unless the plane `moves` with all that is there.
+    """
+    if not model.plane.exists:
+        return
+    normal, shift = model.plane.normal, other.start_position[0] - model.start_position[0]
+    away = [] if moves else [shift @ normal]
+    if not np.allclose([*(other.plane.normal - normal), *away], 0.0, atol=SAME_PLANE):
+        raise InputError(
+            f"gradient: {path} {'turns' if moves else 'turns or moves'} the plane in which this model moves; allowed "
+            "are numbers that keep it, or `solver.dimension: 3`"
+        )
 
 
 def known_quantities(stepper: Stepper, state: State, description: Description) -> dict[str, Any]:

@@ -35,6 +35,7 @@ from bilayer_core.simulation.gradients.nearby import (
     carry_directors,
     described,
     known_quantities,
+    refuse_other_plane,
     slope,
     values_of,
 )
@@ -77,6 +78,8 @@ BESIDE, LEAST = 1e3, 1e-9
 """Distance from the end of a step beyond which derivatives may be wrong, over what Newton's tolerance lets it be off,
 and of the longest rod.
 """
+LOST = 1e-9
+"""Part of a rate that is lost by rounding."""
 NEAR = 1e-5
 """h of a number, over its size, where barriers are steep."""
 
@@ -183,7 +186,7 @@ class RunResponse:
         self._rates = StepRates(self.model, agains)
         self._here = agains[0]
         self._maker = builders.stepper_of(self.model)
-        self._from_start = self._begins_at_start()
+        self.from_start = self._begins_at_start()
         count, channels = len(course), len(self._here.inputs.first)
         ends = np.array([float(course.start.time[0]), *(end for end, _ in course.made)])
         self._driven = Driven(
@@ -231,9 +234,8 @@ class RunResponse:
         """Return whether the run began at the start of its scene, which depends on the scene's numbers."""
         own, start = self._builders.state_of(self.model), self._course.start
         if self.scene.start == SETTLE and start.time[0] == 0.0:
-            if any(
-                part.any() for part in (start.velocity, start.spin, start.body_velocity, start.body_angular_velocity)
-            ):
+            moving = start.velocity, start.spin, start.body_velocity, start.body_angular_velocity
+            if any(part.any() for part in moving):
                 raise InputError("gradient: a run is not differentiated through a start that settles and then moves")
             return True
         parts = ("time", "position", "velocity", "director1", "spin", "transduction", "body_position", "body_rotation")
@@ -290,6 +292,8 @@ class RunResponse:
             if found.agains[0].end_rates.size != self._here.end_rates.size or not np.array_equal(*raised):
                 states = [self._builders.state_of(again.model) for again in found.agains]
                 found.rates = [(state.strain_rate, state.strain_acceleration) for state in states]
+        for again in found.agains:
+            refuse_other_plane(self.model, again.model, path, moves=False)
         if any(
             again.size != self._here.size or again.model.node_count != self.model.node_count for again in found.agains
         ):
@@ -314,9 +318,9 @@ class RunResponse:
         own = self._course.start
         if number.around and not number.first[0].any():
             return place, speed, 0.0 * own.strain_rate, 0.0 * own.transduction
-        if self._from_start and self.scene.start == SETTLE:
+        if self.from_start and self.scene.start == SETTLE:
             h, states = self._settled(number)
-        elif self._from_start and not number.gain.any():
+        elif self.from_start and not number.gain.any():
             h, states = (
                 self._step * number.scale,
                 [self._builders.state_of(of.model) for of in number.agains or number.around],
@@ -351,6 +355,13 @@ class RunResponse:
         rates = rate("strain_rate") if number.rates is None else np.zeros(here.end_rates.size)
         alike = len(states[0].transduction) == len(own.transduction)
         reached = rate("transduction") if alike else 0.0 * own.transduction
+        ways, of_bodies = here.problem.bodies.freedom, place[here.of_bodies].ravel()
+        lost = of_bodies - ways @ np.linalg.lstsq(ways, of_bodies, rcond=None)[0]
+        if np.abs(lost).max(initial=0.0) > LOST * np.abs(place).max(initial=0.0):
+            raise InputError(
+                f"gradient: {number.path} moves a body where its guide or joint does not let it go; differentiate by "
+                "what moves along with it"
+            )
         return self._rates.constants.moves[:, 0] * place, speed, rates, reached
 
     def _settled(self, number: Number) -> tuple[float, list[State]]:

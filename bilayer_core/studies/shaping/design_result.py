@@ -100,12 +100,13 @@ class DesignResult:
         ]
         for shape in self.shapes:
             at = ", ".join(f"{name} = {value:g}" for name, value in shape.stimulus.items()) or "no stimulus"
+            away = f", at most {100.0 * shape.distances.max() / self.size:.3g} % away" if len(self.shapes) > 1 else ""
             lines.append(
                 f"  at {at}: {shape.target.source} is {1e3 * shape.target.length:.4g} mm long, the rod "
-                f"{1e3 * shape.length:.4g} mm; {'stable' if shape.stable else 'UNSTABLE'}"
+                f"{1e3 * shape.length:.4g} mm{away}; {'stable' if shape.stable else 'UNSTABLE'}"
             )
         if self.at_bounds:
-            lines.append(f"  {self.at_bounds} values are at their bounds, which limit the shape")
+            lines.append(f"  values at their bounds, which limit the shape: {self.at_bounds}")
         for layer, moved in self.sensitivity.items():
             lines.append(f"  an error of 1 % in {layer} moves the rod by up to {100 * moved / self.size:.3g} %")
         return "\n".join(lines)

@@ -9,11 +9,15 @@ with d_i the way of station i from the nearest point of the wanted curve (Gauss 
 costs nothing, as a drawn curve does not say how the strip is stretched. A step that makes this sum larger is made
 again with a weight of staying. Far away this is no good: in a plane, the first step takes angles of edges in place of
 distances, in which free strips are linear; in space, wanted shapes are approached through shapes that bend less.
+Strips that sag or curl across may come to rest elsewhere: a pattern may be right, and yet the way to its shape not. So
+where the first step leads astray, shapes that bend less are followed in a plane as well, without weight; then weight
+comes back while the shape is held, in which gains are linear, too.
 Values of palettes come last, from the linear problem about the best pattern without them, then about that with them.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -51,7 +55,15 @@ TURN = 1.0
 STEEPEST = math.radians(10.0)
 """Between the clamp and the start of a wanted curve."""
 LONGEST = 1.1
-"""Length of a wanted curve, of what the rod can become."""
+"""Length of a wanted curve, of the longest rod within the bounds; that of the shortest, of a wanted curve."""
+ASIDE = 0.05
+"""Of its length: by how much a curve may leave its plane where the rod stays in one."""
+CLOSE = 1e-3
+"""Root mean square of distances, of the length of the rod, from which on no other way is tried."""
+ASTRAY, SHORTEST = 0.2, 1.0 / 64.0
+"""Largest error of linear equations about a step, of what it was to mend, and the shortest step, of the whole way."""
+FIXED = 1e-9
+"""Motion of the rod along one direction, of that along another, that is none."""
 AT_BOUND = 1e-6
 """Part of the way between bounds."""
 
@@ -135,14 +147,15 @@ class _Search:
         self._names = [name for v in varied for name in v.names]
         owners = self._pattern.split(np.arange(len(self._values)))
         self._owner = np.concatenate([v.in_scene(own) for v, own in zip(varied, owners, strict=True)])
-        self.equilibria = 0
+        self.equilibria, self._weight, self._failure = 0, 1.0, ""
         self._known: list[Array] = []
         self._here = self._built(self._values)
         self._nodes = self._strands()
         self._size = float(np.linalg.norm(np.diff(self._curve(self._here[0]), axis=0), axis=1).sum())
-        self._targets = [self._placed(curve, here) for curve, here in zip(curves, self._here, strict=True)]
         self._parameters = [self._sought(here) for here in self._here]
         self._by_laws = self._are_laws()
+        self._refuse_idle()
+        self._targets = [self._placed(*of) for of in zip(curves, self._here, self._slopes(), strict=True)]
 
     def _built(self, values: Array, shapes: Sequence[Equilibrium] = ()) -> list[Equilibrium]:
         """Return the equilibria of the scene with such values, one for each target, near some shapes."""
@@ -160,21 +173,34 @@ class _Search:
         return found
 
     def _changes(self, values: Array) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+        found: dict[str, Any] = {"gravity": self._gravity}
         for v, own in zip(self._varied, self._pattern.split(values), strict=True):
             found |= v.changes(own)
         return found
+
+    @property
+    def _gravity(self) -> tuple[float, ...]:
+        return tuple(self._weight * of for of in self._scene.gravity)
+
+    @property
+    def _in_plane(self) -> bool:
+        return bool(self._here[0].model.plane.exists)
 
     def _are_laws(self) -> bool:
         """Return whether all values are gains, for which nothing is built."""
         return all(p.laws.size for of in self._parameters for p in of)
 
-    def _sought(self, here: Equilibrium) -> list[Parameter]:
-        return [p for of in here.parameters(self._names).values() for p in of]
+    def _sought(self, here: Equilibrium, names: Sequence[str] = ()) -> list[Parameter]:
+        return [p for of in here.parameters(names or self._names).values() for p in of]
 
     def _strands(self) -> list[slice]:
         """Return the nodes of the strands of the rod; two of them have its curve between them."""
         name, strands = rod_of(self._scene, self._varied), self._here[0].model.strands
+        rod = next(rod for rod in self._scene.rods if name in rod.copy_names)
+        if not (rod.clamp_start or any(variant.clamp_start for variant in rod.variants)):
+            raise InputError(
+                f"rods.{rod.name}: wanted curves begin where the rod does, which nothing holds: clamp_start"
+            )
         found = [slice(s.first_node, s.first_node + s.shown) for s in strands if s.rod == name]
         return found if len({s.stop - s.start for s in found}) == 1 else found[:1]
 
@@ -194,7 +220,7 @@ class _Search:
             self._known = [self._derivatives(*of) @ acts for of in zip(self._here, self._parameters, strict=True)]
         return self._known
 
-    def _placed(self, curve: TargetCurve, here: Equilibrium) -> TargetCurve:
+    def _placed(self, curve: TargetCurve, here: Equilibrium, slopes: Array) -> TargetCurve:
         """Return a target, moved to where the rod begins."""
         made, first = self._curve(here), [nodes.start for nodes in self._nodes]
         start = here.model.start_position
@@ -206,17 +232,31 @@ class _Search:
                 f"{curve.source}: begins {math.degrees(angle):.3g}° from the direction in which the rod begins, which "
                 f"is {', '.join(f'{x:.3g}' for x in way)}; allowed are {math.degrees(STEEPEST):g}°: turn the curve"
             )
-        if curve.length > LONGEST * self._size:
+        edges = np.diff(made, axis=0)
+        lengths = np.linalg.norm(edges, axis=1)
+        growth = np.einsum(
+            "ia,iak->k", edges / lengths[:, None], np.diff(slopes, axis=0)
+        )  # of the length by each value
+        ends = np.array([self._pattern.low, self._pattern.high]) - self._values
+        least, most = lengths.sum() + (np.sort(growth * ends, axis=0) @ np.ones(len(growth)))
+        if not least / LONGEST <= curve.length <= LONGEST * most:
             raise InputError(
-                f"{curve.source}: is {1e3 * curve.length:.4g} mm long, the rod {1e3 * self._size:.4g} mm; allowed are "
-                f"{LONGEST:g} times its length: it cannot stretch so far"
+                f"{curve.source}: is {1e3 * curve.length:.4g} mm long; within these bounds the rod becomes "
+                f"{1e3 * least:.4g} to {1e3 * most:.4g} mm long, and allowed are {LONGEST:g} times more and less"
             )
+        if self._in_plane:
+            aside = np.ptp(curve.points @ np.cross(*here.model.rods.axes))
+            if aside > ASIDE * curve.length:
+                raise InputError(
+                    f"{curve.source}: leaves its plane by {1e3 * aside:.4g} mm, in which the rod stays; allowed are "
+                    f"{100.0 * ASIDE:g} % of its length: let the rod twist, as fibres at an angle do"
+                )
         return TargetCurve(curve.points + (made[0] - curve.at(np.zeros(1))[0]), curve.source)
 
     def _go(self, values: Array) -> None:
         """Go to the equilibria with other values."""
         self._known = []
-        if not self._by_laws:
+        if not self._by_laws or self._here[0].scene.gravity != self._gravity:
             self._here = self._built(values, self._here)
             self._parameters = [self._sought(here) for here in self._here]
         else:
@@ -240,22 +280,22 @@ class _Search:
         ways = [away for away, _ in self._departures(targets)]
         return math.sqrt(np.mean([np.mean((away**2).sum(axis=1)) for away in ways])) / self._size
 
-    def _equations(self, targets: Sequence[TargetCurve]) -> tuple[Array, Array]:
+    def _equations(self, targets: Sequence[TargetCurve], slopes: list[Array]) -> tuple[Array, Array]:
         """Return the Jacobian and the values of distances, over the length of the rod."""
         rows, right = [], []
-        for (away, tangents), slopes in zip(self._departures(targets), self._slopes(), strict=True):
-            across = slopes - np.einsum("ia,ib,ibk->iak", tangents, tangents, slopes)
-            rows.append(across.reshape(-1, len(self._values)) / self._size)
+        for (away, tangents), slope in zip(self._departures(targets), slopes, strict=True):
+            across = slope - np.einsum("ia,ib,ibk->iak", tangents, tangents, slope)
+            rows.append(across.reshape(away.size, -1) / self._size)
             right.append(away.ravel() / self._size)
         return np.concatenate(rows) / math.sqrt(len(away)), np.concatenate(right) / math.sqrt(len(away))
 
-    def _angles(self) -> tuple[Array, Array]:
+    def _angles(self, targets: Sequence[TargetCurve], slopes: list[Array]) -> tuple[Array, Array]:
         """Return the Jacobian and the values of angles of edges in the plane, over those of the targets [rad]."""
         rows, right = [], []
-        for here, target, slopes in zip(self._here, self._targets, self._slopes(), strict=True):
+        for here, target, slope in zip(self._here, targets, slopes, strict=True):
             made = self._curve(here)
             one, other = here.model.rods.axes
-            edges, changes = np.diff(made, axis=0), np.diff(slopes, axis=0)
+            edges, changes = np.diff(made, axis=0), np.diff(slope, axis=0)
             lengths = np.linalg.norm(edges, axis=1)
             along = np.concatenate([[0.0], np.cumsum(lengths)]) * target.length / lengths.sum()
             ways = target.tangents(0.5 * (along[1:] + along[:-1]))
@@ -277,15 +317,15 @@ class _Search:
         for _ in range(steps):
             if self._rms(targets) <= ENOUGH:
                 return "the shape is as wanted"
-            before, now, equations = self._values, self._left(targets), self._equations(targets)
+            before, now, equations = self._kept(), self._left(targets), self._equations(targets, self._slopes())
             for _ in range(MOST_TRIALS):
-                new = self._left_with(self._pattern.solved(*equations, before, damping), targets)
+                new = self._left_with(self._pattern.solved(*equations, self._values, damping), targets)
                 if new < now:
                     break
+                self._return_to(before)
                 damping = max(STRONGER * damping, WEAKEST)
             else:
-                self._return_to(before)
-                return "no step leads nearer"
+                return f"no step leads nearer{self._failure}"
             damping = damping / STRONGER if damping > WEAKEST else 0.0
             self._tell()
             slow = slow + 1 if new > (1.0 - STALLED) * now else 0
@@ -295,22 +335,28 @@ class _Search:
 
     def _left_with(self, values: Array, targets: Sequence[TargetCurve]) -> float:
         """Go to other values, and return what is left there, infinity if there is no equilibrium."""
+        self._values, self._failure = values, ""
         try:
             self._go(values)
-        except SimulationError:
+        except SimulationError as error:
+            self._failure = f": {error}"
             return math.inf
-        self._values = values
         return self._left(targets)
 
-    def _return_to(self, values: Array) -> None:
-        self._go(values)
-        self._values = values
+    def _kept(self) -> tuple[Any, ...]:
+        """Return values and their equilibria for `_return_to`."""
+        return self._values, self._weight, self._here, self._parameters, self._known, [of.kept() for of in self._here]
+
+    def _return_to(self, kept: tuple[Any, ...]) -> None:
+        self._values, self._weight, self._here, self._parameters, self._known, shapes = kept
+        for here, shape in zip(self._here, shapes, strict=True):
+            here.return_to(shape)
 
     def _take_palettes(self) -> str:
         """Take values of palettes, from the linear problem about each pattern that was tried."""
-        free, best, least, tried = 100.0 * self._rms(self._targets), self._values, math.inf, set()
+        free, best, least, tried = 100.0 * self._rms(self._targets), self._kept(), math.inf, set()
         for _ in range(MOST_PALETTES):
-            values = self._pattern.printable(*self._equations(self._targets), self._values)
+            values = self._pattern.printable(*self._equations(self._targets, self._slopes()), self._values)
             if values.tobytes() in tried:
                 break
             tried.add(values.tobytes())
@@ -318,10 +364,10 @@ class _Search:
             if not math.isfinite(left):
                 break
             self._tell()
-            best, least = (values, left) if left < least else (best, least)
-        if not math.isfinite(least):
-            return "no pattern of the palette has an equilibrium near"
+            best, least = (self._kept(), left) if left < least else (best, least)
         self._return_to(best)
+        if not math.isfinite(least):
+            return f"no pattern of the palette has an equilibrium near{self._failure}"
         return f"values of the palette; without it: rms distance {free:.3g} %"
 
     def _tell(self) -> None:
@@ -331,20 +377,7 @@ class _Search:
 
     def result(self) -> DesignResult:
         """Search, and return what was found."""
-        self._refuse_idle()
-        if self._here[0].model.plane.exists:
-            before, left = self._values, self._left(self._targets)
-            if not self._left_with(self._pattern.solved(*self._angles(), before, 0.0), self._targets) < left:
-                self._return_to(before)
-            self._tell()
-        else:
-            starts = [self._curve(here) for here in self._here]
-            turns = max(_turning(target) for target in self._targets)
-            count = math.ceil(turns / TURN)
-            for k in range(1, count):
-                near = [between(start, of, k / count) for start, of in zip(starts, self._targets, strict=True)]
-                self._improve(near, 2)
-        termination = self._found()
+        termination = self._search()
         for _ in range(MOST_MODELS):
             scene = load_content(scene_content(self._scene), self._changes(self._values))
             simulator = Simulator(scene)
@@ -355,7 +388,90 @@ class _Search:
             self._parameters = [self._sought(here) for here in self._here]
             self._by_laws = self._are_laws()
             termination = self._found()
-        return self._report(termination, simulator)
+        return self._report(termination + self._out_of_reach(), simulator)
+
+    def _search(self) -> str:
+        """Go to the best pattern, and return why the search ended there.
+
+        If the direct way leads astray, another goes through shapes between without weight, which then comes back.
+        """
+        start, heavy, left = self._kept(), any(self._scene.gravity), self._left(self._targets)
+        if self._in_plane:
+            known = self._step(self._targets, 1.0)
+            if not self._left(self._targets) < left:
+                self._return_to(start)
+            self._tell()
+        else:
+            known = not heavy
+            self._approach()
+        ended = self._found()
+        if known or self._rms(self._targets) <= CLOSE:
+            return ended
+        best, least, other = self._kept(), self._left(self._targets), ""
+        self._return_to(start)
+        with contextlib.suppress(SimulationError):
+            self._detour(heavy)
+            other = self._found()
+        if other and self._left(self._targets) < least:
+            return other
+        self._return_to(best)
+        return ended
+
+    def _detour(self, heavy: bool) -> None:
+        """Go near the targets without weight, and let it come back."""
+        if heavy:
+            self._weight = 0.0
+            self._go(self._values)
+        self._approach()
+        if heavy:
+            self._in_parts(lambda part: self._step(self._targets, part))
+            self._weight = 1.0
+            self._go(self._values)
+
+    def _approach(self) -> None:
+        """Go near the targets through shapes between."""
+        starts = [self._curve(here) for here in self._here]
+
+        def near(part: float) -> list[TargetCurve]:
+            return [between(start, of, part) for start, of in zip(starts, self._targets, strict=True)]
+
+        if self._in_plane:
+            self._in_parts(lambda part: self._step(near(part), self._weight))
+        else:
+            count = math.ceil(max(_turning(target) for target in self._targets) / TURN)
+            for k in range(1, count):
+                self._improve(near(k / count), 2)
+
+    def _in_parts(self, go: Callable[[float], bool]) -> None:
+        """Go part of the way from 0 to 1, and on from there; half as far where that leads astray."""
+        done, step = 0.0, 1.0
+        while done < 1.0 and step >= SHORTEST:
+            before = self._kept()
+            if go(done + step):
+                done += step
+                step = min(2.0 * step, 1.0 - done)
+                self._tell()
+            else:
+                self._return_to(before)
+                step *= 0.5
+
+    def _step(self, targets: Sequence[TargetCurve], weight: float) -> bool:
+        """Make a step towards targets under a part of the weight, and return whether it led where equations say."""
+        equations, pull = self._angles if self._in_plane else self._equations, np.zeros(1)
+        if weight != self._weight:
+            self._here = self._built(self._values, self._here)  # whose scenes have the present gains
+            sizes = {f"gravity.{k}": size for k, size in enumerate(self._scene.gravity) if size}
+            slopes = [self._derivatives(here, self._sought(here, list(sizes))) for here in self._here]
+            pull = equations(targets, slopes)[0] @ list(sizes.values()) * (weight - self._weight)
+            self._parameters = [self._sought(here) for here in self._here]
+            self._weight, self._known = weight, []
+        rows, right = equations(targets, self._slopes())
+        values = self._pattern.solved(rows, right + pull, self._values, 0.0)
+        wanted = right + pull + rows @ (values - self._values)
+        if not math.isfinite(self._left_with(values, targets)):
+            return False
+        error = np.linalg.norm(equations(targets, self._slopes())[1] - wanted)
+        return bool(error <= ASTRAY * np.linalg.norm(right + pull))
 
     def _found(self) -> str:
         """Go to the best pattern that is near, and return why the search ended there."""
@@ -364,11 +480,20 @@ class _Search:
 
     def _refuse_idle(self) -> None:
         moved = np.max([np.abs(slopes).max(axis=(0, 1)) for slopes in self._slopes()], axis=0)
-        largest = moved * (self._pattern.high - self._pattern.low)
-        if idle := [
-            name for name, of in zip(self._names, largest[self._owner], strict=True) if of < 1e-12 * self._size
-        ]:
-            raise InputError(f"vary {', '.join(idle[:4])}: acts on nothing at these stimuli; leave it out")
+        acts = self._pattern.split(moved * (self._pattern.high - self._pattern.low) >= 1e-12 * self._size)
+        if idle := [v.path for v, own in zip(self._varied, acts, strict=True) if not own.any()]:
+            raise InputError(f"vary {', '.join(idle)}: acts on nothing at these stimuli; leave it out")
+
+    def _out_of_reach(self) -> str:
+        """Return along which direction nothing moves the rod though it is away from a target, as a text."""
+        for (away, _), slopes in zip(self._departures(self._targets), self._slopes(), strict=True):
+            moved = slopes.swapaxes(1, 2).reshape(-1, 3)
+            _, sizes, ways = np.linalg.svd(moved, full_matrices=False)
+            missed = float(np.abs(away @ ways[2]).max())
+            if sizes[2] < FIXED * sizes[0] and missed > CLOSE * self._size:
+                way = ", ".join(f"{abs(x):.3g}" for x in ways[2])
+                return f"; unreachable: {1e3 * missed:.3g} mm along ({way}), where nothing that varies moves the rod"
+        return ""
 
     def _report(self, termination: str, simulator: Simulator) -> DesignResult:
         scene, shapes = simulator.scene, []

@@ -35,6 +35,8 @@ class TargetCurve:
         [m], in order.
     source : str
         What messages call it.
+    sharpest : float
+        Largest turn from a piece to the next that is no kink [rad].
 
     Attributes
     ----------
@@ -49,7 +51,7 @@ class TargetCurve:
         If there are too few points, two next to each other are one, or they have a kink.
     """
 
-    def __init__(self, points: Array, source: str = "target"):
+    def __init__(self, points: Array, source: str = "target", sharpest: float = SHARPEST):
         points = np.array(points, dtype=float)
         if points.ndim != 2 or points.shape[1] != 3 or len(points) < FEWEST:
             raise InputError(f"{source}: must be {FEWEST} points or more of x, y and z, has shape {points.shape}")
@@ -66,11 +68,11 @@ class TargetCurve:
             raise InputError(f"{source}: point {int(np.argmin(lengths)) + 2} is that before it; leave one out")
         tangents = pieces / lengths[:, None]
         turns = np.arccos(np.clip(np.einsum("ij,ij->i", tangents[1:], tangents[:-1]), -1.0, 1.0))
-        if turns.max() > SHARPEST:
+        if turns.max() > sharpest:
             k = int(np.argmax(turns))
             raise InputError(
                 f"{source}: has a kink at point {k + 2} ({', '.join(f'{x:.4g}' for x in points[k + 1])} m), where it "
-                f"turns by {math.degrees(turns[k]):.3g}°; allowed are {math.degrees(SHARPEST):g}° from piece to piece: "
+                f"turns by {math.degrees(turns[k]):.3g}°; allowed are {math.degrees(sharpest):g}° from piece to piece: "
                 "round it off, or give more points where it bends"
             )
         self.points, self.source = points, source
@@ -186,7 +188,7 @@ def between(start: Array, target: TargetCurve, part: float) -> TargetCurve:
         bend = (1.0 - part) * one + part * two
         now = _carry(now, bend[0] * now[1] + bend[1] * now[2])
         points.append(points[-1] + length * now[0])
-    return TargetCurve(np.array(points), target.source)
+    return TargetCurve(np.array(points), target.source, math.pi)
 
 
 def _turn(one: Array, other: Array) -> Array:

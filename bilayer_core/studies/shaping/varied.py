@@ -102,14 +102,17 @@ def read_varied(scene: SceneConfig, asked: Vary) -> tuple[SceneConfig, list[Vari
     if not given:
         raise InputError(f"vary: nothing is given; each {FORM}")
     found: list[Varied] = []
+    places: dict[tuple[int, Any], str] = {}
+    original = scene_content(scene)
     for path, ends, points in given:
-        if path in [v.path for v in found]:
-            raise InputError(f"vary {path}: is given twice")
         content = scene_content(scene)
         try:
-            holder, place = read_overrides({path: 0.0})[0].find(content)
+            holder, place = read_overrides({path: 0.0})[0].find(original)
         except SceneError as error:
             raise SceneError(f"vary {path}: {str(error).partition(': ')[2]}") from error
+        if (id(holder), place) in places:
+            raise InputError(f"vary {path}: is given twice, as {places[id(holder), place]} before")
+        places[id(holder), place] = path
         held, profile = holder[place], None
         if isinstance(held, dict) and held.keys() == {"at", "value"}:
             profile = held
@@ -124,7 +127,11 @@ def read_varied(scene: SceneConfig, asked: Vary) -> tuple[SceneConfig, list[Vari
             start = start[::2] if palette else start
         start = np.clip(start.astype(float), low, high)
         found.append(Varied(path, low, high, tuple(at), start, palette))
-        scene = load_content(scene_content(scene), found[-1].changes(start))
+        try:
+            scene = load_content(scene_content(scene), found[-1].changes(start))
+        except SceneError as error:
+            along = f"cannot vary along the rod, leave out :{points}: " if at and profile is None else ""
+            raise SceneError(f"vary {path}: {along}{str(error).partition(': ')[2]}") from error
     return scene, found
 
 
