@@ -510,8 +510,7 @@ def _relax(sliding, same):
 def start_surface_friction(sliding, p, start, stage):
     """Freeze the contacts at the start of a stage; returns a status."""
     if sliding.acts:
-        if sliding.places[0] > 0:
-            sliding.spread[:, :] = False
+        sliding.spread[:, :] = False
         freeze_surface_contacts(sliding, p, start, stage)
         sliding.relaxation[0] = 0.0
     return READY

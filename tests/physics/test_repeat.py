@@ -53,6 +53,11 @@ def test_a_run_that_is_interfered_with_goes_on_bit_for_bit(chosen):
     assert_goes_on(lambda: crowded_simulator(*chosen, newton_tolerance=LOOSE), 0.4 * DURATION, act=interfere)
 
 
+def test_contacts_that_friction_spread_in_one_step_leave_nothing_to_the_next():
+    scene = load_scene("crawling_film")
+    assert_goes_on(lambda: Simulator(scene), 0.4, every=1, fresh_every=100, steps=2)
+
+
 @SCENES
 def test_bundled_scenes_go_on_bit_for_bit(name):
     scene = load_scene(bundled_scenes()[name])
