@@ -99,7 +99,7 @@ def test_commands_work_without_the_names_that_windows_lacks(tmp_path, commands):
     synthetic_run.run(McapRecorder(tmp_path / "run.mcap"), np.arange(3) * 0.02)
     (tmp_path / "sweep.yaml").write_text(SWEEP)
     (tmp_path / "data.csv").write_text("time,com.z [m]\n0,0\n0.001,-2.5e-6\n0.002,-1e-5\n")
-    (tmp_path / "curve.csv").write_text("x,y,z\n0,0,0\n0.01,0,0\n0.02,0,0\n0.03,0,0\n")
+    (tmp_path / "curve.csv").write_text("x,y,z\n0,0,0\n0.03,0,0\n0.06,0,0\n0.1,0,0\n")
     (tmp_path / "run_all.py").write_text(RUN_ALL)
     done = elsewhere("run_all.py", cwd=tmp_path, input=json.dumps([arguments for arguments, _ in commands]))
     found = json.loads(done.stdout.rpartition("ENDED")[2] or "[]")

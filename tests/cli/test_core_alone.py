@@ -111,7 +111,7 @@ def ended(tmp_path_factory, python):
     synthetic_run.run(McapRecorder(here / "run.mcap"), np.arange(3) * 0.02)
     (here / "sweep.yaml").write_text(SWEEP)
     (here / "data.csv").write_text("time,com.z [m]\n0,0\n0.001,0\n0.002,0\n")
-    (here / "curve.csv").write_text("x,y,z\n0,0,0\n0.01,0,0\n0.02,0,0\n0.03,0,0\n")
+    (here / "curve.csv").write_text("x,y,z\n0,0,0\n0.03,0,0\n0.06,0,0\n0.1,0,0\n")
     (here / "run_all.py").write_text(RUN_ALL)
     commands = [[verb, *more] for verb, more in WORKS.items()] + [arguments for arguments, _, _ in NEEDS]
     done = subprocess.run(

@@ -173,7 +173,7 @@ class _Search:
         return found
 
     def _changes(self, values: Array) -> dict[str, Any]:
-        found: dict[str, Any] = {"gravity": self._gravity}
+        found: dict[str, Any] = {} if self._weight == 1.0 else {"gravity": list(self._gravity)}
         for v, own in zip(self._varied, self._pattern.split(values), strict=True):
             found |= v.changes(own)
         return found
@@ -395,7 +395,8 @@ class _Search:
 
         If the direct way leads astray, another goes through shapes between without weight, which then comes back.
         """
-        start, heavy, left = self._kept(), any(self._scene.gravity), self._left(self._targets)
+        start, left = self._kept(), self._left(self._targets)
+        heavy = any(self._scene.gravity) and not any(v.path.startswith("gravity") for v in self._varied)
         if self._in_plane:
             known = self._step(self._targets, 1.0)
             if not self._left(self._targets) < left:
