@@ -32,16 +32,21 @@ def ranges():
     return {**STRIP, "parameters": RANGES}
 
 
-def search_in_process(content, metric, trials, functions=None):
-    """A search without processes, as `optimise` makes it with one worker."""
-
-    read = read_sweep(content, functions=functions, is_search=True)
-    search, rows = Search(read, metric, True, 3), []
+def told(search, read, trials):
+    """A search, with the rows of the runs that it asked for and was told of."""
+    rows = []
     for _ in range(trials):
         point = search.ask()
         rows += execute(read.job, [point])
         search.tell(point.number, rows[-1])
     return search, rows
+
+
+def search_in_process(content, metric, trials, functions=None):
+    """A search without processes, as `optimise` makes it with one worker."""
+
+    read = read_sweep(content, functions=functions, is_search=True)
+    return told(Search(read, metric, True, 3), read, trials)
 
 
 def test_a_known_optimum_is_found(ranges):
@@ -155,12 +160,7 @@ def climb_in_process(content, trials, seed=3, largest=True):
     read = read_sweep(content, is_search=True)
     refuse_unclimbable(read, "reach")
     read = replace(read, job=replace(read.job, slope_of="reach"))
-    climbs, rows = Ascent(read, "reach", largest, seed, start_of(read)), []
-    for _ in range(trials):
-        point = climbs.ask()
-        rows += execute(read.job, [point])
-        climbs.tell(point.number, rows[-1])
-    return climbs, rows
+    return told(Ascent(read, "reach", largest, seed, start_of(read)), read, trials)
 
 
 def test_climbs_along_derivatives_find_a_known_optimum(straight):
