@@ -21,7 +21,8 @@ import math
 
 from bilayer_core.contact.step_bound import square_of_change
 from bilayer_core.jit import kernel
-from bilayer_core.kinematics.vector import combine, cross, dot, row
+from bilayer_core.jit.called import flat
+from bilayer_core.kinematics.vector import POSITIVE, combine, cross, dot, row
 
 LARGEST_SLOPE = 0.5
 """Of α σ."""
@@ -29,15 +30,22 @@ LARGEST_SLOPE = 0.5
 
 @kernel
 def place_rails(rails, at):
-    """Write the positions of rails [m], shape (n_node, 3)."""
-    place, m1, m2 = rails.place, at.director1, at.director2
-    for r in range(place.shape[0]):
-        i, up, aside = rails.node[r], 0.5 * rails.arm[r, 0], 0.5 * rails.arm[r, 1]
-        before, after = rails.node_edges[i, 0], rails.node_edges[i, 1]
-        for c in range(3):
-            place[r, c] = at.position[i, c] + up * (m1[before, c] + m1[after, c])
-        for c in range(3 if aside != 0.0 else 0):
-            place[r, c] += aside * (m2[before, c] + m2[after, c])
+    """Write the positions of rails [m], shape (n_rail, 3)."""
+    up, aside = flat(rails.by_component[0]), flat(rails.by_component[1])
+    for b in range(rails.block.shape[0]):
+        r, i, count = rails.block[b, 0] & POSITIVE, rails.block[b, 1] & POSITIVE, rails.block[b, 4] & POSITIVE
+        before, after = rails.block[b, 2] & POSITIVE, rails.block[b, 3] & POSITIVE
+        place, node = flat(rails.place[r : r + count]), flat(at.position[i : i + count])
+        m1, m1_after = flat(at.director1[before : before + count]), flat(at.director1[after : after + count])
+        h = up[3 * r : 3 * (r + count)]
+        for n in range(3 * count):
+            place[n] = node[n] + h[n] * (m1[n] + m1_after[n])
+        if rails.node.shape[0] == rails.node_edges.shape[0]:  # no rod has borders
+            continue
+        m2, m2_after = flat(at.director2[before : before + count]), flat(at.director2[after : after + count])
+        w = aside[3 * r : 3 * (r + count)]
+        for n in range(3 * count):
+            place[n] += w[n] * (m2[n] + m2_after[n])
 
 
 @kernel

@@ -223,7 +223,7 @@ def _inertial(p, stage, at):
         energy += strands.node_mass[i] * (x * x + y * y + z * z)
     for e in range(strands.spin_inertia.shape[0]):
         energy += strands.spin_inertia[e] * (at.total_angle[e] - stage.predicted_angle[e]) ** 2
-    energy += 2.0 * inertia_off_curve(p.raised, strands, at, stage)
+    energy += 2.0 * inertia_off_curve(p.raised, at, stage)
     s, n, a = stack_matrix(3, 3), stack_matrix(3, 3), stack_matrix(3, 3)
     for f in range(bodies.mass.shape[0]):
         turned = at.body_departure_quaternion

@@ -37,13 +37,16 @@ from __future__ import annotations
 import math
 
 from bilayer_core.jit import kernel, piece
-from bilayer_core.kinematics.vector import add_row, combine, dot, row
+from bilayer_core.jit.called import flat, stack_vector
+from bilayer_core.kinematics.vector import POSITIVE
 from bilayer_core.model.force_slots import slot_of
-from bilayer_core.model.records.parts import Raised
+from bilayer_core.model.records.parts import TOGETHER, Raised
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.step import Configuration, Stage
 
 INERTIA, DAMPING, GRAVITY = map(slot_of, ("inertia", "damping", "gravity"))
+OF_EDGES, OF_NODES = 3 * TOGETHER, 3 * TOGETHER + 3
+"""Components of the edges of a block at most, and of their nodes."""
 
 
 @kernel
@@ -88,79 +91,118 @@ def director_motion(raised, at, stage, r):
 
 
 @kernel
-def _quadratic(raised, r, u0, u1, director):
-    """Return (a u₀ + b u₁)·U + ½ c |U|² with motions u of nodes and U of m1, and its derivative by U."""
-    along = combine(raised.first_moment[r, 0], u0, raised.first_moment[r, 1], u1)
-    second = raised.second_moment[r]
-    return dot(director, combine(1.0, along, 0.5 * second, director)), combine(1.0, along, second, director)
+def _quadratic(raised, r, count, u, turned, slope_out):
+    """Return Σ (a u₀ + b u₁)·U + ½ c |U|² of a block with motions u of nodes and U of m1, and write its derivatives by
+    U; all by components.
+    """
+    a, b, c = flat(raised.by_component[0]), flat(raised.by_component[1]), flat(raised.by_component[2])
+    a, b, c, value = a[3 * r : 3 * (r + count)], b[3 * r : 3 * (r + count)], c[3 * r : 3 * (r + count)], 0.0
+    for n in range(3 * count):
+        along = a[n] * u[n] + b[n] * u[n + 3]
+        slope_out[n] = along + c[n] * turned[n]
+        value += (along + slope_out[n]) * turned[n]
+    return 0.5 * value
 
 
 @kernel
-def _add_quadratic(raised, r, i, factor, u0, u1, director, sums):
+def _add_quadratic(raised, r, i, count, factor, u, turned, sums):
     """Add the derivatives of `_quadratic` times a factor, and return its value [J]."""
-    a, b = factor * raised.first_moment[r, 0], factor * raised.first_moment[r, 1]
-    value, slope = _quadratic(raised, r, u0, u1, director)
-    add_row(sums.node, i, a, director)
-    add_row(sums.node, i + 1, b, director)
-    add_row(sums.pull, r, factor, slope)
+    slope = stack_vector(OF_EDGES)
+    value = _quadratic(raised, r, count, u, turned, slope)
+    pull = flat(sums.pull[r : r + count])
+    for n in range(3 * count):
+        pull[n] += factor * slope[n]
+    for half in range(2):
+        moment, gradient = flat(raised.by_component[half]), flat(sums.node[i + half : i + half + count])
+        moment = moment[3 * r : 3 * (r + count)]
+        for n in range(3 * count):
+            gradient[n] += factor * moment[n] * turned[n]
     return factor * value
 
 
 @kernel
-def inertia_off_curve(raised, strands, at, stage):
+def _of_block(raised, b):
+    """Return the first of a block of raised edges, its edge and node, and how many edges there are."""
+    block = raised.block
+    return block[b, 0] & POSITIVE, block[b, 1] & POSITIVE, block[b, 2] & POSITIVE, block[b, 4] & POSITIVE
+
+
+@kernel
+def _directors_ahead(at, stage, r, k, count, out):
+    """Write D of a block."""
+    now, predicted = flat(at.director1[k : k + count]), flat(stage.predicted_director[r : r + count])
+    for n in range(3 * count):
+        out[n] = now[n] - predicted[n]
+
+
+@kernel
+def inertia_off_curve(raised, at, stage):
     """Return the potential of inertia of raised masses beyond that of nodes and spins, times γγ′h² [kg m²]."""
-    energy = 0.0
-    for r in range(raised.edge.shape[0]):
-        k = raised.edge[r]
-        i, ahead = strands.edge_node[k], combine(1.0, row(at.director1, k), -1.0, row(stage.predicted_director, r))
-        energy += _quadratic(raised, r, row(at.departure, i), row(at.departure, i + 1), ahead)[0]
+    energy, ahead, slope = 0.0, stack_vector(OF_EDGES), stack_vector(OF_EDGES)
+    for b in range(raised.block.shape[0]):
+        r, k, i, count = _of_block(raised, b)
+        _directors_ahead(at, stage, r, k, count, ahead)
+        energy += _quadratic(raised, r, count, flat(at.departure[i : i + count + 1]), ahead, slope)
     return energy
 
 
 @kernel
-def _add_inertia(raised, strands, factor, at, stage, sums):
+def _add_inertia(raised, factor, at, stage, sums):
     """Add the inertia of raised masses beyond that of nodes and spins, and return it [J]."""
-    energy = 0.0
-    for r in range(raised.edge.shape[0]):
-        k = raised.edge[r]
-        i, ahead = strands.edge_node[k], combine(1.0, row(at.director1, k), -1.0, row(stage.predicted_director, r))
-        energy += _add_quadratic(raised, r, i, factor, row(at.departure, i), row(at.departure, i + 1), ahead, sums)
+    energy, ahead = 0.0, stack_vector(OF_EDGES)
+    for b in range(raised.block.shape[0]):
+        r, k, i, count = _of_block(raised, b)
+        _directors_ahead(at, stage, r, k, count, ahead)
+        energy += _add_quadratic(raised, r, i, count, factor, flat(at.departure[i : i + count + 1]), ahead, sums)
     return energy
 
 
 @kernel
-def _add_damping(raised, strands, factor, at, stage, sums):
+def _add_damping(raised, factor, at, stage, sums):
     """Add the mass damping of raised masses beyond that of nodes and spins, and return it [J]."""
-    energy, x, origin = 0.0, at.position, stage.origin_position
-    for r in range(raised.edge.shape[0]):
-        i, turned = strands.edge_node[raised.edge[r]], director_motion(raised, at, stage, r)
-        u0 = combine(1.0, row(x, i), -1.0, row(origin, i))
-        u1 = combine(1.0, row(x, i + 1), -1.0, row(origin, i + 1))
-        energy += _add_quadratic(raised, r, i, factor, u0, u1, turned, sums)
+    energy, moved, turned = 0.0, stack_vector(OF_NODES), stack_vector(OF_EDGES)
+    for b in range(raised.block.shape[0]):
+        r, k, i, count = _of_block(raised, b)
+        x, origin = flat(at.position[i : i + count + 1]), flat(stage.origin_position[i : i + count + 1])
+        for n in range(3 * count + 3):
+            moved[n] = x[n] - origin[n]
+        now, first = flat(at.director1[k : k + count]), raised.first + 3 * raised.block[b, 3]
+        before = stage.origin_strain[first : first + 3 * count]
+        for n in range(3 * count):
+            turned[n] = now[n] - before[n]
+        energy += _add_quadratic(raised, r, i, count, factor, moved, turned, sums)
     return energy
 
 
 @kernel
 def _add_weight(raised, gravity, at, pull_out):
     """Add −(a + b) g·w of raised masses and return it [J]."""
-    energy = 0.0
-    for r in range(raised.edge.shape[0]):
-        moment = raised.first_moment[r, 0] + raised.first_moment[r, 1]
-        weight = moment * gravity[0], moment * gravity[1], moment * gravity[2]
-        add_row(pull_out, r, -1.0, weight)
-        energy -= dot(weight, row(at.director1, raised.edge[r]))
+    energy, g0, g1, g2 = 0.0, gravity[0], gravity[1], gravity[2]
+    for b in range(raised.block.shape[0]):
+        r, k, _, count = _of_block(raised, b)
+        moment, m1, pull = (
+            raised.first_moment[r : r + count],
+            flat(at.director1[k : k + count]),
+            flat(pull_out[r : r + count]),
+        )
+        for n in range(count):
+            m = moment[n, 0] + moment[n, 1]
+            energy -= m * (g0 * m1[3 * n] + g1 * m1[3 * n + 1] + g2 * m1[3 * n + 2])
+            pull[3 * n] -= m * g0
+            pull[3 * n + 1] -= m * g1
+            pull[3 * n + 2] -= m * g2
     return energy
 
 
 @piece(float, Raised, Problem, Configuration, Stage, bool)
 def add_raised_masses(raised, p, at, stage, with_hessian):
     """Add what inertia, mass damping and gravity of raised masses have beyond those of nodes, with its gradients."""
-    strands, sums, h, g = p.strands, p.sums, stage.length, p.gravity
+    sums, h, g = p.sums, stage.length, p.gravity
     if sums.selected[INERTIA]:
         factor = 1.0 / (h * stage.momentum_length)
-        sums.energy[INERTIA] += _add_inertia(raised, strands, factor, at, stage, sums)
+        sums.energy[INERTIA] += _add_inertia(raised, factor, at, stage, sums)
     if p.damping > 0.0 and sums.selected[DAMPING]:
-        energy = _add_damping(raised, strands, p.damping / h, at, stage, sums)
+        energy = _add_damping(raised, p.damping / h, at, stage, sums)
         sums.energy[DAMPING] += energy
         sums.lost[DAMPING] += 2.0 * energy / h
     if (g[0] != 0.0 or g[1] != 0.0 or g[2] != 0.0) and sums.selected[GRAVITY]:
@@ -183,9 +225,15 @@ def kinetic_energy_off_curve(raised, strands, velocity, rate):
 @kernel
 def pull_edges(raised, at, sums):
     """Add the pulls of raised edges to their vectors and angles."""
-    for r in range(raised.edge.shape[0]):
-        k, g = raised.edge[r], row(sums.pull, r)
-        along = dot(g, row(at.tangent, k)) / at.length[k]
-        for c in range(3):
-            sums.edge[k, c] -= along * at.director1[k, c]
-        sums.edge[k, 3] += dot(g, row(at.director2, k))
+    for b in range(raised.block.shape[0]):
+        r, k, _, count = _of_block(raised, b)
+        g, t, length = flat(sums.pull[r : r + count]), flat(at.tangent[k : k + count]), at.length[k : k + count]
+        m1, m2 = flat(at.director1[k : k + count]), flat(at.director2[k : k + count])
+        edge = flat(sums.edge[k : k + count])
+        for n in range(count):
+            g0, g1, g2 = g[3 * n], g[3 * n + 1], g[3 * n + 2]
+            along = (g0 * t[3 * n] + g1 * t[3 * n + 1] + g2 * t[3 * n + 2]) / length[n]
+            edge[4 * n] -= along * m1[3 * n]
+            edge[4 * n + 1] -= along * m1[3 * n + 1]
+            edge[4 * n + 2] -= along * m1[3 * n + 2]
+            edge[4 * n + 3] += g0 * m2[3 * n] + g1 * m2[3 * n + 1] + g2 * m2[3 * n + 2]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bilayer_core.jit import UNALLOCATED
+from bilayer_core.model.blocks import blocks
 from bilayer_core.model.records.parts import Raised
 from bilayer_core.model.strands import Collected
 
@@ -59,5 +60,16 @@ def build_raised(found: Collected, loaded: Array, in_fluid: bool) -> tuple[Raise
     if not len(edge):
         return Raised.absent(), number, int(kept[-1])
     number[edge] = np.arange(len(edge))
-    parts = {"first_moment": first[edge], "second_moment": second[edge], "middle": middle[edge]}
-    return Raised.zeros(UNALLOCATED, first=0, slot=kept[edge] - 1, edge=edge, **parts), number, int(kept[-1])
+    slot, moments = kept[edge] - 1, np.column_stack([first[edge], second[edge]])
+    raised = Raised.zeros(
+        UNALLOCATED,
+        first=0,
+        slot=slot,
+        edge=edge,
+        first_moment=first[edge],
+        second_moment=second[edge],
+        middle=middle[edge],
+        block=blocks(edge, found.column("edge_node", np.int64)[edge], slot),
+        by_component=np.repeat(moments.T[:, :, None], 3, axis=2),
+    )
+    return raised, number, int(kept[-1])

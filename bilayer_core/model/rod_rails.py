@@ -6,6 +6,7 @@ import numpy as np
 
 from bilayer_core.jit import UNALLOCATED
 from bilayer_core.kinematics.frame_strains import cross
+from bilayer_core.model.blocks import blocks
 from bilayer_core.model.records.contacts import Rails
 from bilayer_core.model.rod_points import NO_ARM
 from bilayer_core.model.strands import Collected
@@ -51,7 +52,16 @@ def build_rails(found: Collected, ribbons: set[str]) -> Rails:
     slope = size / found.column("rest_length")[edges[node]].min(axis=1)
     turn = size / found.column("half_width")[edges[node]].min(axis=1)
     factor = float(np.max(1.0 + 4.0 * slope + turn))  # half of the lengths is left at least
-    return Rails.zeros(UNALLOCATED, node=node, arm=arm, right=right, node_edges=edges, factor=factor)
+    return Rails.zeros(
+        UNALLOCATED,
+        node=node,
+        arm=arm,
+        right=right,
+        node_edges=edges,
+        factor=factor,
+        block=blocks(node, *edges[node].T),
+        by_component=np.repeat(0.5 * arm.T[:, :, None], 3, axis=2),
+    )
 
 
 def start_rails(found: Collected, rails: Rails) -> Array:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from bilayer_core.engine.linear.assembly import add, add_twice
 from bilayer_core.jit import kernel, piece
-from bilayer_core.kinematics.vector import dot, row
+from bilayer_core.kinematics.vector import POSITIVE, dot, row
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration
@@ -55,7 +55,7 @@ def _put_own_block(band, d, pp, pq, qq):
 @kernel
 def _put_block(band, row, column, pp, pq, qp, qq):
     """Write a block of two nodes, row > column: rows p, q of the first, columns p, q of the second."""
-    r = row - column
+    r = (row - column) & POSITIVE
     band[column, r] = pp
     band[column + 1, r - 1] = pq
     band[column, r + 1] = qp
@@ -79,7 +79,7 @@ def _put_edges(plane, strands, length, node_hessian, factor, band):
     before_pp = before_pq = before_qq = 0.0  # of the edge before
     pp = pq = qp = qq = 0.0  # of the joint with it
     for k in range(strands.edge_node.shape[0]):
-        i, joint = strands.edge_node[k], plane.joint_after[k]
+        i, joint = strands.edge_node[k] & POSITIVE, plane.joint_after[k]
         tp, tq, mp, mq = frame[k, 0], frame[k, 1], frame[k, 2], frame[k, 3]
         s = polar_hessian[k, 0]
         x = polar_hessian[k, 1] - polar_gradient[k, 1] / length[k]
@@ -89,6 +89,7 @@ def _put_edges(plane, strands, length, node_hessian, factor, band):
         edge_qq = s * tq * tq + 2.0 * x * tq * mq + w * mq * mq
         next_pp = next_pq = next_qp = next_qq = 0.0
         if joint >= 0:
+            joint &= POSITIVE
             s, x_ab = cross_hessian[joint, 0], cross_hessian[joint, 1]
             x_ba, w = cross_hessian[joint, 2], cross_hessian[joint, 3]
             up, uq, vp, vq = s * tp + x_ba * mp, s * tq + x_ba * mq, x_ab * tp + w * mp, x_ab * tq + w * mq
@@ -99,7 +100,7 @@ def _put_edges(plane, strands, length, node_hessian, factor, band):
         own_pp += before_pp + edge_pp - 2.0 * pp
         own_pq += before_pq + edge_pq - pq - qp
         own_qq += before_qq + edge_qq - 2.0 * qq
-        d0, d1 = unknown[i], unknown[i + 1]
+        d0, d1 = unknown[i] & POSITIVE, unknown[i + 1] & POSITIVE
         _put_own_block(band, d0, own_pp, own_pq, own_qq)
         _put_block(
             band,

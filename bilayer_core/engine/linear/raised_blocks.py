@@ -17,7 +17,7 @@ and with u = A t/l those by positions
 from __future__ import annotations
 
 from bilayer_core.jit import kernel, piece
-from bilayer_core.kinematics.vector import combine, combine3, dot, row, scaled
+from bilayer_core.kinematics.vector import POSITIVE, combine, combine3, dot, row, scaled
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration
@@ -41,7 +41,7 @@ def _by_positions(band, d0, d1, count, w, p0, p1):
             if n >= m:
                 band[d0 + m, n - m] += w[m] * p0[n] + p0[m] * w[n]
                 band[d1 + m, n - m] += w[m] * p1[n] + p1[m] * w[n]
-            band[d0 + m, d1 + n - d0 - m] -= w[m] * p1[n] + p0[m] * w[n]
+            band[d0 + m, (d1 + n - d0 - m) & POSITIVE] -= w[m] * p1[n] + p0[m] * w[n]
 
 
 @piece(int, Problem, Configuration, float)
@@ -51,9 +51,9 @@ def assemble_raised(p, at, factor):
     hessian, in_plane = sums.raised_hessian, strands.dimension == 2
     axis1, axis2, wet = row(strands.axes, 0), row(strands.axes, 1), hessian.shape[0] > 0
     for r in range(raised.edge.shape[0]):
-        k = raised.edge[r]
-        i, inverse, z = strands.edge_node[k], 1.0 / at.length[k], raised.middle[r]
-        d0, d1, square = strands.row[i], strands.row[i + 1], inverse * inverse
+        k = raised.edge[r] & POSITIVE
+        i, inverse, z = strands.edge_node[k] & POSITIVE, 1.0 / at.length[k], raised.middle[r]
+        d0, d1, square = strands.row[i] & POSITIVE, strands.row[i + 1] & POSITIVE, inverse * inverse
         a, b = factor * raised.first_moment[r, 0], factor * raised.first_moment[r, 1]
         g, t, w, mass = row(sums.pull, r), row(at.tangent, k), row(at.director1, k), factor * raised.second_moment[r]
         along, second = dot(g, t), mass  # g·t, t·C t

@@ -181,6 +181,8 @@ class Rails:
     right: Indices  # rail of the right border at the first node of each edge, −1 of round ones, shape (n_edge,)
     node_edges: IndexTable  # before and after each node, the same at an end, shape (n_node, 2)
     factor: float  # how many times farther than nodes, and borders of edges by a turn, rails move at most
+    block: IndexTable  # of rails that follow each other: the first, its node and edges; how many; shape (…, 5)
+    by_component: Stack  # half of either arm, three times in a row, shape (2, n_rail, 3)
     place: Matrix = ("rail", 3)  # [m]
     meets: Flags = ("rail",)  # whether it has a part in a contact found last
     rate: Stack = ("rail", 3, 8)  # of these by the edges at each node, see `forces.rail_arms`

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from bilayer_core.jit.record import Flags, IndexTable, Indices, Matrix, Stack, Vector, record
 
+TOGETHER = 64
+"""Elements of a block at most, which kernels take together (`model.blocks`)."""
+
 
 @record
 class Strands:
@@ -235,6 +238,10 @@ class Raised:
     first_moment: Matrix  # mass × z of the halves at the first and at the second node [kg m], shape (n_raised, 2)
     second_moment: Vector  # mass × z² of both halves [kg m²], shape (n_raised,)
     middle: Vector  # z of the middle of the section, where a fluid acts [m], shape (n_raised,)
+    block: (
+        IndexTable  # of edges that follow each other: first of these, its edge, node and slot; how many; shape (…, 5)
+    )
+    by_component: Stack  # both first moments and the second, each three times in a row, shape (3, n_raised, 3)
 
 
 @record
