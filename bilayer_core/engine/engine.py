@@ -133,13 +133,9 @@ class Engine:
         After so many `passes` of Newton's method they pause before the next attempt at a step, after `patience` more
         within one. A step that did so may go on, from the same state.
         """
-        outcome = self._outcome
-        outcome.passes, outcome.patience = passes, patience
-        if not goes_on:
-            self._attempt.rejected = 0
         self._storage.set_friction(state.friction)
         self._numbers.reset()
-        done = integrate(self._parts_for(state), until, due, most, *self._newton)
+        done = integrate(self._parts_for(state), until, due, most, passes, patience, goes_on, *self._newton)
         found = self._numbers_of_outcome.read()
         status = found["status"]
         self.passes = passes - found["passes"]

@@ -248,8 +248,8 @@ def _pause(run, done, status, pair, end, gap, rejected, length, shortest, starts
     return _leave(run, done, status, pair, end, gap)
 
 
-@piece(int, Integration, float, float, int, float, int)
-def integrate(run, until, due, most, newton_tolerance, max_iterations):
+@piece(int, Integration, float, float, int, int, int, bool, float, int)
+def integrate(run, until, due, most, passes, patience, goes_on, newton_tolerance, max_iterations):
     """Advance a state in time, by at most so many steps, as far as each succeeds, and take them into the extrema.
 
     Parameters
@@ -262,6 +262,10 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
         would have been [s].
     most : int
         A part of a fixed step counts as one.
+    passes, patience : int
+        See `Outcome`.
+    goes_on : bool
+        Whether a step that paused goes on.
     newton_tolerance : float
         In steps that are not long [m/s].
     max_iterations : int
@@ -271,12 +275,15 @@ def integrate(run, until, due, most, newton_tolerance, max_iterations):
     done : int
         Number of steps made; what they took is in `Counts`.
         In `Outcome`: why there are no more, the blocking pair of the last attempt, its configuration, and the gap.
-        `INPUTS_END`: the actuation is to be continued from the present time. `PAUSED`: all `Outcome.passes` are made.
+        `INPUTS_END`: the actuation is to be continued from the present time. `PAUSED`: all `passes` are made.
     """
     p, state, work, clock, control, counts = run.problem, run.state, run.work, run.clock, run.control, run.counts
     attempt = run.attempt
     start_state, inputs, outcome, fixed = run.start_state, run.inputs, p.outcome, run.control.dt > 0.0
     status, pair, end, gap = READY, -1, 1, math.inf
+    outcome.passes, outcome.patience = passes, patience
+    if not goes_on:
+        attempt.rejected = 0
     for k in range(most):
         begin = clock.time[0]
         grid = _end_of_fixed(control, clock) if fixed else math.inf
