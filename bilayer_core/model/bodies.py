@@ -56,6 +56,7 @@ def build_bodies(scene: SceneConfig, found: Collected, plane: Plane | None = Non
         inertia=np.ravel([np.repeat([m, np.trace(j)], 3) for m, j in zip(mass, moments, strict=True)]),
         freedom=freedom,
         freedom_first=6 * (np.argmax(freedom != 0.0, axis=0) // 6) if free else free_index[:0],
+        freedom_alone=_alone(freedom) if free else free_index[:0],
         bounding_radius=_bounding_radii(scene, found, shapes, free, moments),
         rotates=np.array([index in free or body.motion.turns for index, body in enumerate(scene.bodies)], dtype=bool),
     )
@@ -111,6 +112,12 @@ def guided_motions(motion: Guided, motions: np.ndarray) -> np.ndarray:
     if motion.pinned:
         columns += [column for column in motions.T if not column[:3].any()]
     return np.array(columns).T
+
+
+def _alone(freedom: np.ndarray) -> np.ndarray:
+    """Return the row of each column that is a unit vector, −1 for others."""
+    units = (freedom == 1.0) & (np.sum(freedom != 0.0, axis=0) == 1)
+    return np.where(units.any(axis=0), np.argmax(units, axis=0), -1)
 
 
 def _inertia_of_held(found: Collected, count: int) -> np.ndarray:

@@ -65,6 +65,13 @@ def _write_jacobian(axes, arm, k, out):
 
 
 @kernel
+def add_to_row(border, row, column, value):
+    """Add to a value of U, and note its row."""
+    border.border[row, column] += value
+    border.noted[row] = True
+
+
+@kernel
 def _add_rotation(arm, gradient, k, base, corner):
     """Add ½ (ρ gᵀ + g ρᵀ) − (ρ·g) I, of row k of both, to the block of a body's rotation, which begins at `base`."""
     product = dot(row(arm, k), row(gradient, k))
@@ -101,7 +108,7 @@ def condense_nodes(attachments, strands, at, sums, band, border):
                     continue
                 if other < 0:
                     for n in range(6):
-                        border.border[i, 6 * f + n] += value * jacobian[c, n]
+                        add_to_row(border, i, 6 * f + n, value * jacobian[c, n])
                 elif attachments.free[other] >= 0:
                     _write_jacobian(axes, at.arm, other, other_jacobian)
                     first, own = 6 * attachments.free[other], i - attachments.unknown[other]
@@ -146,7 +153,7 @@ def condense_clamp_edges(attachments, strands, at, sums, border):
                     h = sums.cross_hessian[x, p, q] if comes_first else sums.cross_hessian[x, q, p]
                     values[q, m] += jacobian[p, m] * h
         for m in range(3):
-            border.border[strands.edge_unknown[edge], base + m] += values[3, m]
+            add_to_row(border, strands.edge_unknown[edge], base + m, values[3, m])
         _add_to_edge(attachments, strands, at.arm, edge, values, base, border, scratch)
 
 
@@ -191,7 +198,7 @@ def _add_to_edge(attachments, strands, arm, edge, values, base, border, scratch)
             for m in range(3):
                 value = sign * values[c, m]
                 if other < 0:
-                    border.border[first + c, base + m] += value
+                    add_to_row(border, first + c, base + m, value)
                     continue
                 for n in range(6):
                     start = 6 * attachments.free[other]

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 from bilayer_core.engine.linear.arms import stencil_jacobian, stencil_rows
-from bilayer_core.engine.linear.attachments import condense_clamp_edges, condense_clamp_edges_in_plane, condense_nodes
+from bilayer_core.engine.linear.attachments import (
+    add_to_row,
+    condense_clamp_edges,
+    condense_clamp_edges_in_plane,
+    condense_nodes,
+)
 from bilayer_core.engine.linear.border import column_times, subtract_column
 from bilayer_core.engine.linear.contact_columns import condense_contacts_to_bodies
 from bilayer_core.engine.linear.dense import count_negative_dense, factor_dense, solve_dense
@@ -22,11 +27,14 @@ def assemble_bodies(p, at):
     `coupled`.
     """
     border, coupled, attachments, strands, sums = p.border, p.bordered.coupled, p.attachments, p.strands, p.sums
-    border.border[:] = 0.0
+    for row in range(border.noted.shape[0]):
+        if border.noted[row]:
+            border.border[row] = 0.0
+            border.noted[row] = False
     copy(sums.body_hessian, border.corner)
     if sums.links[0] > 0:
         coupled[0] = 1
-        _add_links(p.surfaces, strands, sums, border.border)
+        _add_links(p.surfaces, strands, sums, border)
     if attachments.holding > 0:
         coupled[0] = 1
         condense_contacts_to_bodies(p.contact_columns, attachments, strands, at, border)
@@ -57,7 +65,7 @@ def _add_links(surfaces, strands, sums, border):
             for c in range(3):
                 if rows[m] >= 0 and jacobian[c, m] != 0.0:
                     for n in range(6):
-                        border[rows[m], column + n] += jacobian[c, m] * sums.link_hessian[k, c, n]
+                        add_to_row(border, rows[m], column + n, jacobian[c, m] * sums.link_hessian[k, c, n])
 
 
 @kernel
@@ -74,7 +82,7 @@ def restrict_bodies(p, shift):
     """Return D and U restricted to what bodies may do, shifted by multiples of their masses."""
     freedom, inertia, constrained, dimension = p.bodies.freedom, p.bodies.inertia, p.constrained, p.strands.dimension
     schur, corner, rows = p.bordered.schur, p.border.corner, p.border.border
-    (m, n), firsts = freedom.shape, p.bodies.freedom_first
+    (m, n), firsts, alone = freedom.shape, p.bodies.freedom_first, p.bodies.freedom_alone
     for a in range(n):
         for b in range(n):
             schur[a, b] = 0.0
@@ -82,6 +90,9 @@ def restrict_bodies(p, shift):
             if freedom[i, a] != 0.0:
                 for b in range(n):
                     total = shift * inertia[i] * freedom[i, b]
+                    if alone[b] >= 0:
+                        schur[a, b] += freedom[i, a] * (total + corner[i, alone[b]])
+                        continue
                     for j in range(firsts[b], firsts[b] + 6):
                         total += corner[i, j] * freedom[j, b]
                     schur[a, b] += freedom[i, a] * total
@@ -94,7 +105,7 @@ def restrict_bodies(p, shift):
     for a in range(n):
         clear_column(p.bordered, a)
     for row in range(p.strands.size):
-        if not _any(rows[row]):  # most have none
+        if not (p.border.noted[row] and _any(rows[row])):  # most have none
             continue
         before, present = -1, False
         for a in range(n):

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from bilayer_core.contact.rails import has_arm
 from bilayer_core.engine.linear.assembly import hold_unknowns
-from bilayer_core.engine.linear.attachments import arm_jacobian
+from bilayer_core.engine.linear.attachments import add_to_row, arm_jacobian
 from bilayer_core.engine.linear.new_columns import add_columns, add_to_column
 from bilayer_core.forces.rail_arms import touches
 from bilayer_core.jit import kernel, piece
@@ -430,10 +430,10 @@ def condense_contacts_to_bodies(columns, attachments, strands, at, border):
                             border.corner[6 * g + q, 6 * f + k] += turned
                 elif f >= 0 and second < 0:
                     for k in range(6):
-                        border.border[j, 6 * f + k] += arm_jacobian(axes, arm, first, x, k) * value
+                        add_to_row(border, j, 6 * f + k, arm_jacobian(axes, arm, first, x, k) * value)
                 elif g >= 0 and first < 0:
                     for k in range(6):
-                        border.border[i, 6 * g + k] += arm_jacobian(axes, arm, second, y, k) * value
+                        add_to_row(border, i, 6 * g + k, arm_jacobian(axes, arm, second, y, k) * value)
 
 
 @piece(bool, Problem)

@@ -160,6 +160,7 @@ class Bodies:
     inertia: Vector  # factor of the shift for each unknown of free bodies: m and tr(J), shape (6 n_free,)
     freedom: Matrix  # motions (X, φ) that they are allowed, a column each, orthonormal, shape (6 n_free, n_freedom)
     freedom_first: Indices  # the first unknown of the body that each of its columns moves, shape (n_freedom,)
+    freedom_alone: Indices  # the unknown that a column is, −1 of one with several, likewise
     bounding_radius: Vector  # largest distance of what a body carries, or of gyration [m], shape (n_body + 1,)
     rotates: Flags  # whether a body can turn, shape (n_body,)
 

@@ -89,6 +89,7 @@ class Border:
     """Rows and columns of free bodies in the Newton matrix."""
 
     border: Matrix = ("row", "body unknown")
+    noted: Flags = ("row",)  # which rows of it may have values
     corner: Matrix = ("body unknown", "body unknown")
 
 
