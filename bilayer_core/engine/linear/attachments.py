@@ -95,7 +95,7 @@ def condense_nodes(attachments, strands, at, sums, band, border):
         _write_jacobian(axes, at.arm, k, jacobian)
         for c in range(axes.shape[0]):
             column = attachments.unknown[k] + c
-            for i in range(corner.shape[0]):
+            for i in range(corner.shape[0] if border.noted[column] else 0):
                 value = border.border[column, i]
                 if value != 0.0:
                     for n in range(6):

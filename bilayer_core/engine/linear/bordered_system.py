@@ -107,15 +107,11 @@ def restrict_bodies(p, shift):
     for row in range(p.strands.size):
         if not (p.border.noted[row] and _any(rows[row])):  # most have none
             continue
-        before, present = -1, False
         for a in range(n):
-            first = firsts[a]
-            if first != before:
-                before, present = first, _any(rows[row, first : first + 6])
-            if present:
-                value = 0.0
-                for i in range(first, first + 6):
-                    value += freedom[i, a] * rows[row, i]
+            value = rows[row, alone[a]] if alone[a] >= 0 else 0.0
+            for i in range(firsts[a], firsts[a] + 6 if alone[a] < 0 else firsts[a]):
+                value += freedom[i, a] * rows[row, i]
+            if value != 0.0:
                 add_to_column(p.bordered, a, row, value)
     return READY
 
@@ -143,12 +139,11 @@ def solve_bordered(p):
     bordered, freedom, size = p.bordered, p.bodies.freedom, p.strands.size
     right, body_step = p.system.right, p.system.body_step
     load, columns, scaled = bordered.load, bordered.border, bordered.scaled
-    n, width, free = freedom.shape[1], bordered.width[0], body_step.shape[0]
-    for a in range(n):
+    firsts, width, gradient = p.bodies.freedom_first, bordered.width[0], p.sums.body
+    for a in range(firsts.shape[0]):
         load[a] = 0.0
-        for f in range(free):
-            for c in range(6):
-                load[a] -= freedom[6 * f + c, a] * p.sums.body[f, c]
+        for c in range(6):
+            load[a] -= freedom[firsts[a] + c, a] * gradient[firsts[a] // 6, c]
     if bordered.coupled[0] == 1:
         for a in range(width):
             load[a] -= column_times(scaled, bordered.filled, a, size, right)
@@ -156,9 +151,8 @@ def solve_bordered(p):
     if bordered.coupled[0] == 1:
         for a in range(width):
             subtract_column(columns, bordered.filled, a, size, load[a], right)
-    for f in range(free):
+    body_step[:] = 0.0
+    for a in range(firsts.shape[0]):
         for c in range(6):
-            body_step[f, c] = 0.0
-            for a in range(n):
-                body_step[f, c] += freedom[6 * f + c, a] * load[a]
+            body_step[firsts[a] // 6, c] += freedom[firsts[a] + c, a] * load[a]
     return READY
