@@ -92,6 +92,28 @@ def test_thickness_of_a_layer_is_a_pattern_too():
     assert found.values[0] == pytest.approx([1.3e-3], rel=1e-2)
 
 
+def test_angles_of_fibres_along_a_ribbon_that_made_a_curve_in_space_are_found():
+    """Which lies flat at first, so that its plane is left."""
+    angle, only = "rods.ribbon.layers.lower.fibres.angle", "rods.ribbon.layers.upper"
+    ribbon = {f"{only}.fibres": None, f"{only}.eigenstrain": None, "rods.ribbon.width": 2e-3} | {
+        "rods.ribbon.stations": 31,
+        "rods.ribbon.path.length": 0.05,
+        angle: "90 deg",
+    }
+    made = np.radians([70.0, 95.0, 120.0, 100.0])
+    simulator = Simulator(
+        load_scene("helical_ribbon", ribbon | {angle: {"at": [0, 0.015, 0.035, 0.05], "value": made}})
+    )
+    simulator.set_stimulus("humidity", 1.0)
+    simulator.solve_static()
+    places = {"at": [0, 0.015, 0.035, 0.05], "value": [math.pi / 2.0] * 4}
+    found = design(
+        "helical_ribbon", simulator.positions, [f"{angle}=45 deg:135 deg"], overrides=ribbon | {angle: places}
+    )
+    assert found.rms < 1e-6
+    assert found.values[0] == pytest.approx(made, abs=math.radians(0.1))
+
+
 def test_pieces_of_a_palette_that_made_a_shape_are_found():
     made = [0.0, 0.02, -0.02, 0.02, 0.02, 0.0, -0.02, 0.0]
     ends = np.repeat(np.linspace(0.0, LENGTH, 9), 2)[1:-1] + np.tile([1e-6, -1e-6], 8)

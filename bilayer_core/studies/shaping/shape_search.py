@@ -25,7 +25,8 @@ from typing import Any
 
 import numpy as np
 
-from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.errors import InputError, SceneError, SimulationError
+from bilayer_core.model.plan import best_dimension
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.loader import load_content, load_scene, scene_content
 from bilayer_core.scene.overrides import Overrides
@@ -64,6 +65,8 @@ ASTRAY, SHORTEST = 0.2, 1.0 / 64.0
 """Largest error of linear equations about a step, of what it was to mend, and the shortest step, of the whole way."""
 FIXED = 1e-9
 """Motion of the rod along one direction, of that along another, that is none."""
+AMONG = 0.381966
+"""Part of the way between bounds at which no value is likely to be special."""
 AT_BOUND = 1e-6
 """Part of the way between bounds."""
 
@@ -126,7 +129,20 @@ def design(
     if not 0.0 <= smoothness < math.inf:
         raise InputError(f"smoothness: {smoothness} is not allowed; it must be a finite number from 0 up")
     config, varied = read_varied(config, vary)
+    config = _in_space(config, varied)
     return _Search(config, varied, curves, levels, smoothness, progress).result()
+
+
+def _in_space(scene: SceneConfig, varied: list[Varied]) -> SceneConfig:
+    """Return the scene in space, if only its present values keep it in a plane."""
+    changes = {
+        path: of for v in varied for path, of in v.changes(v.low + AMONG * (v.high - v.low) + 0.0 * v.start).items()
+    }
+    with contextlib.suppress(SceneError):
+        other = load_content(scene_content(scene), changes)
+        if scene.solver.dimension == "auto" and best_dimension(scene)[0] < best_dimension(other)[0]:
+            return load_content(scene_content(scene), {"solver.dimension": 3})
+    return scene
 
 
 class _Search:
