@@ -10,7 +10,8 @@ import yaml
 
 from bilayer_core import Simulator, design, load_scene
 from bilayer_core.cli import main
-from bilayer_core.errors import InputError, SceneError
+from bilayer_core.errors import InputError, SceneError, SimulationError
+from bilayer_core.studies.shaping.shape_search import _Search
 from bilayer_core.studies.shaping.target_curve import TargetCurve, between, read_curve
 
 GAIN = "rods.strip.layers.active.eigenstrain.gain"
@@ -60,13 +61,51 @@ def test_one_pattern_serves_two_shapes_at_two_stimuli():
     assert len(found.shapes) == 2
 
 
-@pytest.mark.parametrize("kind", [HANGING | {"rods.strip.width": 2e-3}, {"rods.strip.width": 10e-3}])
-def test_a_film_that_sags_or_curls_across_on_the_way_becomes_a_u(kind):
+def film(**kind):
+    """What makes a film become the U of an arc between two straight ends."""
     turn = math.pi * np.clip(np.linspace(-1.0, 2.0, 120), 0.0, 1.0)
     steps = np.stack([np.cos(turn), 0.0 * turn, np.sin(turn)], axis=1) * LENGTH / 119
     thin = {f"rods.strip.layers.{layer}.thickness": 0.2e-3 for layer in ("passive", "active")}
-    found = design("bending", np.cumsum(steps, axis=0), {GAIN: (-0.2, 0.2, 30)}, overrides=kind | thin)
+    return design("bending", np.cumsum(steps, axis=0), {GAIN: (-0.2, 0.2, 30)}, overrides=kind | thin)
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        HANGING | {"rods.strip.width": 2e-3},
+        {"rods.strip.width": 10e-3},
+        {"rods.strip.width": 40e-3},
+        HANGING | {"rods.strip.width": 40e-3},
+    ],
+)
+def test_a_film_that_sags_or_curls_across_on_the_way_becomes_a_u(kind):
+    found = film(**kind)
     assert found.rms < 2e-4
+    assert found.scene.rods[0].section == "auto" and found.scene.solver.model == "auto"
+
+
+def test_the_report_says_whether_the_rod_comes_to_its_shape_from_the_start_of_the_scene(drawn):
+    wide = film(**{"rods.strip.width": 40e-3})
+    assert "but from the start of the scene the rod comes to another shape" in str(wide)
+    simulator = Simulator(wide.scene)
+    simulator.set_stimulus("swelling", 1.0)
+    simulator.solve_static()
+    assert np.abs(simulator.positions - wide.shapes[0].made).max() > 0.1 * LENGTH
+    assert design("bending", drawn, {GAIN: (-0.05, 0.05, 20)}, overrides=HANGING).shapes[0].reached
+
+
+def test_what_was_found_is_kept_where_the_sections_of_the_pattern_have_no_equilibrium(monkeypatch):
+    built = _Search._built
+
+    def folding(self, *what):
+        if "strip" in self._sections.values():
+            raise SimulationError("folds", 0.0)
+        return built(self, *what)
+
+    monkeypatch.setattr(_Search, "_built", folding)
+    found = film(**{"rods.strip.width": 20e-3})
+    assert "no equilibrium is near with its own sections (rods.strip.section: strip" in found.termination
+    assert found.rms < 2e-4 and found.shapes[0].stable and found.scene.rods[0].section == "beam"
 
 
 def test_bounds_that_limit_a_shape_are_reported_with_the_distance():

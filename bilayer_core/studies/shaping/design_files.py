@@ -46,6 +46,7 @@ def report_of(result: DesignResult) -> dict[str, Any]:
                 "length": shape.length,
                 "largest_distance": float(shape.distances.max()) / result.size,
                 "stable": shape.stable,
+                "reached_from_the_start": shape.reached,
                 "made": shape.made.tolist(),
             }
             for shape in result.shapes

@@ -34,6 +34,8 @@ class Shape:
     length : float
         Of the rod there [m].
     stable : bool
+    reached : bool
+        Whether the rod comes there from the start of the scene, at once or as stimuli rise.
     """
 
     target: TargetCurve
@@ -42,6 +44,13 @@ class Shape:
     distances: Array
     length: float
     stable: bool
+    reached: bool
+
+    @property
+    def state(self) -> str:
+        """A word or two on `stable` and `reached`."""
+        reached = "" if self.reached else ", but from the start of the scene the rod comes to another shape"
+        return ("stable" if self.stable else "UNSTABLE") + reached
 
 
 @dataclass(frozen=True)
@@ -103,7 +112,7 @@ class DesignResult:
             away = f", at most {100.0 * shape.distances.max() / self.size:.3g} % away" if len(self.shapes) > 1 else ""
             lines.append(
                 f"  at {at}: {shape.target.source} is {1e3 * shape.target.length:.4g} mm long, the rod "
-                f"{1e3 * shape.length:.4g} mm{away}; {'stable' if shape.stable else 'UNSTABLE'}"
+                f"{1e3 * shape.length:.4g} mm{away}; {shape.state}"
             )
         if self.at_bounds:
             lines.append(f"  values at their bounds, which limit the shape: {self.at_bounds}")

@@ -26,7 +26,8 @@ from typing import Any
 import numpy as np
 
 from bilayer_core.errors import InputError, SceneError, SimulationError
-from bilayer_core.model.plan import best_dimension
+from bilayer_core.model.plan import best_dimension, simplest_model
+from bilayer_core.model.strip_choice import section_of
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.loader import load_content, load_scene, scene_content
 from bilayer_core.scene.overrides import Overrides
@@ -67,6 +68,8 @@ FIXED = 1e-9
 """Motion of the rod along one direction, of that along another, that is none."""
 AMONG = 0.381966
 """Part of the way between bounds at which no value is likely to be special."""
+RISES = 10
+"""Parts in which stimuli rise."""
 AT_BOUND = 1e-6
 """Part of the way between bounds."""
 
@@ -164,6 +167,7 @@ class _Search:
         owners = self._pattern.split(np.arange(len(self._values)))
         self._owner = np.concatenate([v.in_scene(own) for v, own in zip(varied, owners, strict=True)])
         self.equilibria, self._weight, self._failure = 0, 1.0, ""
+        self._sections = _beams_of(scene)
         self._known: list[Array] = []
         self._here = self._built(self._values)
         self._nodes = self._strands()
@@ -175,8 +179,7 @@ class _Search:
 
     def _built(self, values: Array, shapes: Sequence[Equilibrium] = ()) -> list[Equilibrium]:
         """Return the equilibria of the scene with such values, one for each target, near some shapes."""
-        scene = load_content(scene_content(self._scene), self._changes(values))
-        simulator, found = Simulator(scene), []
+        simulator, found = Simulator(self._scene_with(values, self._sections)), []
         for k, level in enumerate(self._levels):
             simulator.reset()
             for channel, value in level.items():
@@ -188,11 +191,11 @@ class _Search:
             found.append(equilibrium_of(simulator))
         return found
 
-    def _changes(self, values: Array) -> dict[str, Any]:
-        found: dict[str, Any] = {} if self._weight == 1.0 else {"gravity": list(self._gravity)}
+    def _scene_with(self, values: Array, sections: dict[str, str]) -> SceneConfig:
+        changes = sections | ({} if self._weight == 1.0 else {"gravity": list(self._gravity)})
         for v, own in zip(self._varied, self._pattern.split(values), strict=True):
-            found |= v.changes(own)
-        return found
+            changes |= v.changes(own)
+        return load_content(scene_content(self._scene), changes)
 
     @property
     def _gravity(self) -> tuple[float, ...]:
@@ -272,15 +275,12 @@ class _Search:
     def _go(self, values: Array) -> None:
         """Go to the equilibria with other values."""
         self._known = []
-        if not self._by_laws or self._here[0].scene.gravity != self._gravity:
+        if not self._by_laws or self._here[0].model.scene.gravity != self._gravity:
             self._here = self._built(values, self._here)
             self._parameters = [self._sought(here) for here in self._here]
         else:
             for here, parameters in zip(self._here, self._parameters, strict=True):
-                gains = here.gains
-                for parameter, value in zip(parameters, values[self._owner].tolist(), strict=True):
-                    gains[parameter.laws] = value
-                here.go_to(gains)
+                here.go_to(parameters, values[self._owner].tolist())
                 self.equilibria += 1
 
     def _departures(self, targets: Sequence[TargetCurve]) -> list[tuple[Array, Array]]:
@@ -392,19 +392,37 @@ class _Search:
             self._progress(f"{self.equilibria} equilibria: rms distance {100 * rms:.3g} % of the rod")
 
     def result(self) -> DesignResult:
-        """Search, and return what was found."""
+        """Search, and return what was found.
+
+        Which sections rods have may follow from the pattern. Beams come first: they have one shape at rest, from which
+        wide strips find their own that is near. Where strips have none, the scene keeps the sections of the search.
+        """
         termination = self._search()
         for _ in range(MOST_MODELS):
-            scene = load_content(scene_content(self._scene), self._changes(self._values))
-            simulator = Simulator(scene)
-            if not self._by_laws or alike_but_gains(self._here[0].model, simulator.model):
+            simulator = Simulator(self._scene_with(self._values, {}))
+            if alike_but_gains(self._here[0].model, simulator.model):
                 break
-            self._scene, self._known = scene, []  # what its sections are follows from the pattern
-            self._here = self._built(self._values, self._here)
-            self._parameters = [self._sought(here) for here in self._here]
-            self._by_laws = self._are_laws()
-            termination = self._found()
+            before, sections = self._kept(), self._sections
+            self._sections, self._known = _sections_of(simulator.scene, simulator.plan.model), []
+            try:
+                self._here = self._built(self._values, self._here)
+                self._parameters = [self._sought(here) for here in self._here]
+                self._by_laws = self._are_laws()
+                termination = self._search()
+            except SimulationError as error:
+                own = ", ".join(f"{path}: {self._sections[path]}" for path in self._sections)
+                termination += f"; no equilibrium is near with its own sections ({own}): {error}"
+                self._sections = sections
+                self._return_to(before)
+                simulator = self._in_sections_of_search()
+                break
+        else:
+            termination += "; sections change with the pattern"
+            simulator = self._in_sections_of_search()
         return self._report(termination + self._out_of_reach(), simulator)
+
+    def _in_sections_of_search(self):
+        return Simulator(self._scene_with(self._values, self._sections))
 
     def _search(self) -> str:
         """Go to the best pattern, and return why the search ended there.
@@ -476,11 +494,9 @@ class _Search:
         """Make a step towards targets under a part of the weight, and return whether it led where equations say."""
         equations, pull = self._angles if self._in_plane else self._equations, np.zeros(1)
         if weight != self._weight:
-            self._here = self._built(self._values, self._here)  # whose scenes have the present gains
             sizes = {f"gravity.{k}": size for k, size in enumerate(self._scene.gravity) if size}
             slopes = [self._derivatives(here, self._sought(here, list(sizes))) for here in self._here]
             pull = equations(targets, slopes)[0] @ list(sizes.values()) * (weight - self._weight)
-            self._parameters = [self._sought(here) for here in self._here]
             self._weight, self._known = weight, []
         rows, right = equations(targets, self._slopes())
         values = self._pattern.solved(rows, right + pull, self._values, 0.0)
@@ -518,33 +534,75 @@ class _Search:
             self._targets, self._levels, self._here, self._departures(self._targets), strict=True
         ):
             made = self._curve(here)
-            take_shape(simulator, here)
-            stable = simulator.solve_static().stable
             length = float(np.linalg.norm(np.diff(made, axis=0), axis=1).sum())
-            shapes.append(Shape(target, level, made, np.linalg.norm(away, axis=1), length, stable))
-        final = equilibrium_of(simulator)
+            stable, reached = self._is_stable(simulator, here), self._is_reached(simulator, here, level)
+            shapes.append(Shape(target, level, made, np.linalg.norm(away, axis=1), length, stable, reached))
         part = self._pattern.parts(self._values)[[not v.palette for v in self._varied for _ in v.start]]
         at_bounds = int(np.sum((part <= AT_BOUND) | (part >= 1.0 - AT_BOUND)))
         values = self._pattern.split(self._values)
         return DesignResult(
-            scene, self._varied, values, shapes, at_bounds, self._sensitivity(final), self.equilibria, termination
+            scene, self._varied, values, shapes, at_bounds, self._sensitivity(), self.equilibria, termination
         )
 
-    def _sensitivity(self, here: Equilibrium) -> dict[str, float]:
-        """Return the displacements by errors of 1 % in each pattern, and in the thickness of each layer [m]."""
+    def _is_stable(self, simulator: Simulator, here: Equilibrium) -> bool:
+        """Return whether a simulator of the scene stays at an equilibrium, and all small disturbances decay."""
+        take_shape(simulator, here)
+        with contextlib.suppress(SimulationError):
+            return simulator.solve_static().stable and self._is_at(simulator, here)
+        return False
+
+    def _is_reached(self, simulator: Simulator, here: Equilibrium, level: dict[str, float]) -> bool:
+        """Return whether the rod comes to an equilibrium from the start of the scene, at once or as stimuli rise."""
+        for count in (1, RISES):
+            simulator.reset()
+            begin = simulator.stimulus
+            with contextlib.suppress(SimulationError):
+                for k in range(1, count + 1):
+                    for channel, value in level.items():
+                        simulator.set_stimulus(channel, begin[channel] + k / count * (value - begin[channel]))
+                    simulator.solve_static()
+                if self._is_at(simulator, here):
+                    return True
+        return False
+
+    def _is_at(self, simulator: Simulator, here: Equilibrium) -> bool:
+        return bool(np.abs(simulator.positions - here.positions).max() <= CLOSE * self._size)
+
+    def _sensitivity(self) -> dict[str, float]:
+        """Return the largest displacements by errors of 1 % in each pattern, and in the thickness of each layer [m]."""
         found: dict[str, float] = {}
-        slopes, begin = self._slopes()[-1], 0
+
+        def note(path: str, moved: list[Array]) -> None:
+            found[path] = 0.01 * max(float(np.linalg.norm(of, axis=1).max()) for of in moved)
+
+        begin = 0
         for v, own in zip(self._varied, self._pattern.split(self._values), strict=True):
-            moved = slopes[..., begin : begin + len(own)] @ own
-            found[v.path] = 0.01 * float(np.linalg.norm(moved, axis=1).max())
+            note(v.path, [slopes[..., begin : begin + len(own)] @ own for slopes in self._slopes()])
             begin += len(own)
         rod = next(rod for rod in self._scene.rods if rod_of(self._scene, self._varied) in rod.copy_names)
         for layer in rod.layers:
             path = f"rods.{rod.name}.layers.{layer.name}.thickness"
             if isinstance(layer.thickness, float) and rod.radius is None and path not in found:
-                moved = self._derivatives(here, here.parameters([path])[path])[..., 0] * layer.thickness
-                found[path] = 0.01 * float(np.linalg.norm(moved, axis=1).max())
+                slopes = [self._derivatives(here, self._sought(here, [path]))[..., 0] for here in self._here]
+                note(path, [slope * layer.thickness for slope in slopes])
         return found
+
+
+def _sections_of(scene: SceneConfig, model: str) -> dict[str, str]:
+    """Return the sections of rods that may be beams or strips, as changes of a scene that give it these alone."""
+    found = {
+        f"rods.{rod.name}.section": section_of(scene, rod, model)
+        for rod in scene.rods
+        if rod.section != "beam" and not rod.feels_across and rod.radius is None
+    }
+    return found | {"solver.model": model} if found else {}
+
+
+def _beams_of(scene: SceneConfig) -> dict[str, str]:
+    """Return changes of a scene that make beams of its strips, where that does not change the model."""
+    model = simplest_model(scene)[0] if scene.solver.model == "auto" else scene.solver.model
+    found = _sections_of(scene, model) if model == "laminate" else {}
+    return {path: "beam" if path.endswith(".section") else value for path, value in found.items()}
 
 
 def _turning(curve: TargetCurve) -> float:
