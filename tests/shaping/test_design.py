@@ -20,13 +20,13 @@ PLACES = np.linspace(0.0, LENGTH, 100)
 PATTERN = 0.01 + 0.02 * np.sin(2.0 * np.pi * PLACES / LENGTH)
 
 
-def curve_of(overrides, stimulus=1.0):
+def curve_of(overrides, stimulus=1.0, scene="bending", channel="swelling", rod="strip"):
     """The curve between the strands of a strip, in equilibrium."""
-    simulator = Simulator(load_scene("bending", overrides))
-    simulator.set_stimulus("swelling", stimulus)
+    simulator = Simulator(load_scene(scene, overrides))
+    simulator.set_stimulus(channel, stimulus)
     simulator.solve_static()
-    strands = {strand.name: strand.nodes for strand in simulator.description.strands}
-    return np.mean([simulator.positions[nodes] for nodes in strands.values()], axis=0)
+    strands = [strand.nodes for strand in simulator.description.strands if strand.rod == rod]
+    return np.mean([simulator.positions[nodes] for nodes in strands], axis=0)
 
 
 @pytest.fixture(scope="module")
@@ -140,17 +140,32 @@ def test_angles_of_fibres_along_a_ribbon_that_made_a_curve_in_space_are_found():
         angle: "90 deg",
     }
     made = np.radians([70.0, 95.0, 120.0, 100.0])
-    simulator = Simulator(
-        load_scene("helical_ribbon", ribbon | {angle: {"at": [0, 0.015, 0.035, 0.05], "value": made}})
-    )
-    simulator.set_stimulus("humidity", 1.0)
-    simulator.solve_static()
-    places = {"at": [0, 0.015, 0.035, 0.05], "value": [math.pi / 2.0] * 4}
-    found = design(
-        "helical_ribbon", simulator.positions, [f"{angle}=45 deg:135 deg"], overrides=ribbon | {angle: places}
-    )
+    profile = {"at": [0, 0.015, 0.035, 0.05], "value": made.tolist()}
+    curve = curve_of(ribbon | {angle: profile}, 1.0, "helical_ribbon", "humidity", "ribbon")
+    flat = ribbon | {angle: profile | {"value": [math.pi / 2.0] * 4}}
+    found = design("helical_ribbon", curve, [f"{angle}=45 deg:135 deg"], overrides=flat)
     assert found.rms < 1e-6
     assert found.values[0] == pytest.approx(made, abs=math.radians(0.1))
+
+
+def test_all_arms_of_a_swimmer_get_the_pattern_of_the_first_though_they_carry_the_hub_that_holds_it():
+    path, gains = "rods.arm.layers.active.eigenstrain.gain", [0.01, 0.03, 0.02]
+    profile = {"at": [0.0, 0.05, 0.1], "value": gains}
+    wanted = curve_of({path: profile}, 1.0, "swimming", "light", "arm_0")
+    found = design("swimming", wanted, {path: (0.0, 0.1)}, overrides={path: profile | {"value": [0.05] * 3}})
+    assert found.values[0] == pytest.approx(gains, abs=1e-5)
+    assert found.largest < 1e-5 and found.shapes[0].reached
+    assert "of arm_0, the first of 8 copies, from the target" in str(found)
+
+
+def test_the_first_rod_that_a_path_names_is_shaped():
+    along, across = (f"rods.{name}.layers.active.eigenstrain.gain" for name in ("along", "across"))
+    wanted = curve_of({along: 0.004}, 1.0, "films", "humidity", "along")
+    assert design("films", wanted, {"gravity.2": (-1.0, 1.0), along: (0.0, 0.01)}).rms < 1e-4
+    with pytest.raises(InputError, match="rods.across.*gain: acts on nothing of rods.along at these stimuli"):
+        design("films", wanted, {along: (0.0, 0.01), across: (0.0, 0.01)})
+    with pytest.raises(InputError, match=r"vary gravity\.2: names none of the rods along, all_around, across; the fir"):
+        design("films", wanted, {"gravity.2": (-1.0, 1.0)})
 
 
 def test_pieces_of_a_palette_that_made_a_shape_are_found():

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.rod import Rod
 from bilayer_core.studies.shaping.target_curve import TargetCurve
 from bilayer_core.studies.shaping.varied import Varied
 
@@ -89,8 +89,8 @@ class DesignResult:
         return self._rod.path.length
 
     @property
-    def _rod(self) -> Any:
-        return next(rod for rod in self.scene.rods if rod.name == rod_of(self.scene, self.varied))
+    def _rod(self) -> Rod:
+        return rod_of(self.scene, self.varied)
 
     @property
     def largest(self) -> float:
@@ -103,9 +103,12 @@ class DesignResult:
         return math.sqrt(np.mean([np.mean(shape.distances**2) for shape in self.shapes])) / self.size
 
     def __str__(self) -> str:
+        copies = self._rod.copy_names
+        copies = f" of {copies[0]}, the first of {len(copies)} copies," if len(copies) > 1 else ""
         lines = [
             f"{self.scene.name}: {sum(map(len, self.values))} values, {self.equilibria} equilibria; {self.termination}",
-            f"  distance from the target: at most {100 * self.largest:.3g} %, rms {100 * self.rms:.3g} % of the rod",
+            f"  distance{copies} from the target: at most {100 * self.largest:.3g} %, rms {100 * self.rms:.3g} % of "
+            "the rod",
         ]
         for shape in self.shapes:
             at = ", ".join(f"{name} = {value:g}" for name, value in shape.stimulus.items()) or "no stimulus"
@@ -121,18 +124,19 @@ class DesignResult:
         return "\n".join(lines)
 
 
-def rod_of(scene: SceneConfig, varied: Sequence[Varied]) -> str:
-    """Return the name of the rod that is shaped: the only one, or that of the first path.
+def rod_of(scene: SceneConfig, varied: Sequence[Varied]) -> Rod:
+    """Return the rod that is shaped: the only one, or the first that a path names.
 
     Raises
     ------
     InputError
         If it is not told which.
     """
-    names = [name for rod in scene.rods for name in rod.copy_names]
-    if len(names) == 1:
-        return names[0]
-    keys = varied[0].path.split(".")
-    if keys[0] == "rods" and keys[1] in names:
-        return keys[1]
-    raise InputError(f"vary {varied[0].path}: names no single rod, of which there are {', '.join(names)}")
+    named = {f"rods.{key}": rod for k, rod in enumerate(scene.rods) for key in (rod.name, k)}
+    found = [named[key] for key in (".".join(v.path.split(".")[:2]) for v in varied) if key in named] or scene.rods
+    if len(found) > 1 and found is scene.rods:
+        names = ", ".join(rod.name for rod in scene.rods)
+        raise InputError(
+            f"vary {varied[0].path}: names none of the rods {names}; the first that a path names is shaped"
+        )
+    return found[0]

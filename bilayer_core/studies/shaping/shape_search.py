@@ -214,23 +214,28 @@ class _Search:
 
     def _strands(self) -> list[slice]:
         """Return the nodes of the strands of the rod; two of them have its curve between them."""
-        name, strands = rod_of(self._scene, self._varied), self._here[0].model.strands
-        rod = next(rod for rod in self._scene.rods if name in rod.copy_names)
-        if not (rod.clamp_start or any(variant.clamp_start for variant in rod.variants)):
+        rod, strands = rod_of(self._scene, self._varied), self._here[0].model.strands
+        name, rod = rod.copies[0].name, rod.copies[0].rod
+        if not rod.clamp_start:
             raise InputError(
                 f"rods.{rod.name}: wanted curves begin where the rod does, which nothing holds: clamp_start"
             )
         found = [slice(s.first_node, s.first_node + s.shown) for s in strands if s.rod == name]
         return found if len({s.stop - s.start for s in found}) == 1 else found[:1]
 
-    def _curve(self, here: Equilibrium) -> Array:
-        """Return the curve of the rod [m], shape (n, 3)."""
-        return np.mean([here.positions[nodes] for nodes in self._nodes], axis=0)
+    def _of_rod(self, of_nodes: Array) -> Array:
+        """Return what the curve of the rod has, of what nodes have."""
+        return np.mean([of_nodes[nodes] for nodes in self._nodes], axis=0)
+
+    def _curve(self, here: Equilibrium | Simulator) -> Array:
+        """Return the curve of the rod from its start, which a body that floats may hold [m], shape (n, 3)."""
+        points = self._of_rod(here.positions)
+        return points - points[0]
 
     def _derivatives(self, here: Equilibrium, parameters: list[Parameter]) -> Array:
         """Return its derivatives, shape (n, 3, n_parameter)."""
-        velocities = here.velocities(parameters)
-        return np.mean([velocities[nodes] for nodes in self._nodes], axis=0)
+        velocities = self._of_rod(here.velocities(parameters))
+        return velocities - velocities[0]
 
     def _slopes(self) -> list[Array]:
         """Return its derivatives by the values at each level, computed once for each equilibrium."""
@@ -240,7 +245,7 @@ class _Search:
         return self._known
 
     def _placed(self, curve: TargetCurve, here: Equilibrium, slopes: Array) -> TargetCurve:
-        """Return a target, moved to where the rod begins."""
+        """Return a target, moved to begin at the origin."""
         made, first = self._curve(here), [nodes.start for nodes in self._nodes]
         start = here.model.start_position
         edge = np.mean([start[k + 1] - start[k] for k in first], axis=0)
@@ -270,7 +275,7 @@ class _Search:
                     f"{curve.source}: leaves its plane by {1e3 * aside:.4g} mm, in which the rod stays; allowed are "
                     f"{100.0 * ASIDE:g} % of its length: let the rod twist, as fibres at an angle do"
                 )
-        return TargetCurve(curve.points + (made[0] - curve.at(np.zeros(1))[0]), curve.source)
+        return TargetCurve(curve.points - curve.at(np.zeros(1))[0], curve.source)
 
     def _go(self, values: Array) -> None:
         """Go to the equilibria with other values."""
@@ -515,7 +520,8 @@ class _Search:
         moved = np.max([np.abs(slopes).max(axis=(0, 1)) for slopes in self._slopes()], axis=0)
         acts = self._pattern.split(moved * (self._pattern.high - self._pattern.low) >= 1e-12 * self._size)
         if idle := [v.path for v, own in zip(self._varied, acts, strict=True) if not own.any()]:
-            raise InputError(f"vary {', '.join(idle)}: acts on nothing at these stimuli; leave it out")
+            of = rod_of(self._scene, self._varied).name
+            raise InputError(f"vary {', '.join(idle)}: acts on nothing of rods.{of} at these stimuli; leave it out")
 
     def _out_of_reach(self) -> str:
         """Return along which direction nothing moves the rod though it is away from a target, as a text."""
@@ -533,7 +539,8 @@ class _Search:
         for target, level, here, (away, _) in zip(
             self._targets, self._levels, self._here, self._departures(self._targets), strict=True
         ):
-            made = self._curve(here)
+            made = self._of_rod(here.positions)
+            target = TargetCurve(target.points + made[0], target.source)
             length = float(np.linalg.norm(np.diff(made, axis=0), axis=1).sum())
             stable, reached = self._is_stable(simulator, here), self._is_reached(simulator, here, level)
             shapes.append(Shape(target, level, made, np.linalg.norm(away, axis=1), length, stable, reached))
@@ -566,7 +573,7 @@ class _Search:
         return False
 
     def _is_at(self, simulator: Simulator, here: Equilibrium) -> bool:
-        return bool(np.abs(simulator.positions - here.positions).max() <= CLOSE * self._size)
+        return bool(np.abs(self._curve(simulator) - self._curve(here)).max() <= CLOSE * self._size)
 
     def _sensitivity(self) -> dict[str, float]:
         """Return the largest displacements by errors of 1 % in each pattern, and in the thickness of each layer [m]."""
@@ -579,7 +586,7 @@ class _Search:
         for v, own in zip(self._varied, self._pattern.split(self._values), strict=True):
             note(v.path, [slopes[..., begin : begin + len(own)] @ own for slopes in self._slopes()])
             begin += len(own)
-        rod = next(rod for rod in self._scene.rods if rod_of(self._scene, self._varied) in rod.copy_names)
+        rod = rod_of(self._scene, self._varied)
         for layer in rod.layers:
             path = f"rods.{rod.name}.layers.{layer.name}.thickness"
             if isinstance(layer.thickness, float) and rod.radius is None and path not in found:
