@@ -125,6 +125,23 @@ def test_a_strip_lies_on_a_post_with_a_pattern_that_is_found_through_contact():
     assert found.values[0] == pytest.approx([0.0, 0.01, 0.0], abs=1e-3)
 
 
+def test_two_layers_that_swell_make_the_rod_as_long_as_the_curve_and_one_says_what_is_left():
+    turn = 0.5 * np.sin(np.linspace(0.0, 2.0 * math.pi, 60))
+    curve = np.cumsum(np.stack([np.cos(turn), 0.0 * turn, np.sin(turn)], axis=1) * 0.107 / 59, axis=0)
+    other, law = "rods.strip.layers.passive.eigenstrain", {"stimulus": "swelling", "gain": 0.01}
+    both = design("bending", curve, {GAIN: (-0.1, 0.1, 20), f"{other}.gain": (-0.1, 0.1, 20)}, overrides={other: law})
+    assert both.shapes[0].ends_apart < 5e-4 and both.rms < 1e-4
+    one = design("bending", curve, {GAIN: (-0.1, 0.1, 20)})
+    assert one.shapes[0].ends_apart > 5e-3 and one.rms < 1e-4
+    assert f"ends {1e3 * one.shapes[0].ends_apart:.3g} mm apart" in str(one)
+
+
+def test_a_shape_at_a_stimulus_at_which_nothing_acts_is_told_as_unreachable():
+    levels = [{"swelling": 1.0}, {"swelling": 0.0}]
+    found = design("bending", [straight(0.1)] * 2, {GAIN: (-0.05, 0.05, 5)}, at=levels, overrides=HANGING)
+    assert re.search(r"unreachable: 3\.\d+ mm at swelling = 0, where nothing that varies moves", found.termination)
+
+
 def test_thickness_of_a_layer_is_a_pattern_too():
     wanted = curve_of({"rods.strip.layers.active.thickness": 1.3e-3})
     found = design("bending", wanted, {"rods.strip.layers.active.thickness": (0.5e-3, 2e-3)})
@@ -183,6 +200,11 @@ def test_pieces_of_two_materials_come_near_a_shape_that_needs_others(drawn):
     assert found.rms < 0.01
     gain = found.scene.rods[0].layers[1].eigenstrain[0].gain
     assert np.abs(curve_of(HANGING | {GAIN: {"at": gain.at, "value": gain.value}}) - found.shapes[0].made).max() < 1e-9
+
+
+def test_more_pieces_of_a_palette_than_stations_come_nearer_than_few(drawn):
+    few, many = (design("bending", drawn, [f"{GAIN}=-5%,0,5%:{pieces}"], overrides=HANGING) for pieces in (20, 100))
+    assert many.rms < 0.2 * few.rms
 
 
 def test_a_layer_takes_the_film_next_to_the_thickness_that_is_best():

@@ -195,7 +195,7 @@ class Equilibrium:
         try:
             for parameter, value in zip(gains, values, strict=True):
                 self._gains[parameter.laws] = value
-                self._changes = self._changes | {parameter.name: value}
+            self._changes = self._changes | {of.name: value for of, value in zip(gains, values, strict=True)}
             put_gains(self.model, self._gains)
             solve_static(self._stepper, self._state)
             self._settle()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,6 +45,11 @@ class Shape:
     length: float
     stable: bool
     reached: bool
+
+    @property
+    def ends_apart(self) -> float:
+        """Distance of the end of the rod from that of the target [m]."""
+        return float(np.linalg.norm(self.made[-1] - self.target.points[-1]))
 
     @property
     def state(self) -> str:
@@ -111,17 +116,22 @@ class DesignResult:
             "the rod",
         ]
         for shape in self.shapes:
-            at = ", ".join(f"{name} = {value:g}" for name, value in shape.stimulus.items()) or "no stimulus"
             away = f", at most {100.0 * shape.distances.max() / self.size:.3g} % away" if len(self.shapes) > 1 else ""
             lines.append(
-                f"  at {at}: {shape.target.source} is {1e3 * shape.target.length:.4g} mm long, the rod "
-                f"{1e3 * shape.length:.4g} mm{away}; {shape.state}"
+                f"  at {stimuli_text(shape.stimulus)}: {shape.target.source} is {1e3 * shape.target.length:.4g} mm "
+                f"long, the rod {1e3 * shape.length:.4g} mm, ends {1e3 * shape.ends_apart:.3g} mm apart{away}; "
+                f"{shape.state}"
             )
         if self.at_bounds:
             lines.append(f"  values at their bounds, which limit the shape: {self.at_bounds}")
         for layer, moved in self.sensitivity.items():
             lines.append(f"  an error of 1 % in {layer} moves the rod by up to {100 * moved / self.size:.3g} %")
         return "\n".join(lines)
+
+
+def stimuli_text(level: Mapping[str, float]) -> str:
+    """Return values of stimuli as a text."""
+    return ", ".join(f"{name} = {value:g}" for name, value in level.items()) or "no stimulus"
 
 
 def rod_of(scene: SceneConfig, varied: Sequence[Varied]) -> Rod:

@@ -5,13 +5,13 @@ the bounds of p,
 
     Σ |d_i + ∂d_i/∂p δp|²/L² + w² Σ (second differences of the pattern, in parts of its bounds)²
 
-with d_i the way of station i from the nearest point of the wanted curve (Gauss and Newton). Sliding along the curve
-costs nothing, as a drawn curve does not say how the strip is stretched. A step that makes this sum larger is made
-again with a weight of staying. Far away this is no good: in a plane, the first step takes angles of edges in place of
-distances, in which free strips are linear; in space, wanted shapes are approached through shapes that bend less.
-Strips that sag or curl across may come to rest elsewhere: a pattern may be right, and yet the way to its shape not. So
-where the first step leads astray, shapes that bend less are followed in a plane as well, without weight; then weight
-comes back while the shape is held, in which gains are linear, too.
+with d_i the way of station i from the nearest point of the wanted curve (Gauss and Newton). A drawn curve does not say
+how the strip is stretched: sliding along it costs nothing, but a little at its end. A step that makes this sum larger
+is made again with a weight of staying. Far away this is no good: in a plane, the first step takes angles of edges in
+place of distances, in which free strips are linear; in space, wanted shapes are approached through shapes that bend
+less. Strips that sag or curl across may come to rest elsewhere: a pattern may be right, and yet the way to its shape
+not. So where the first step leads astray, shapes that bend less are followed in a plane as well, without weight; then
+weight comes back while the shape is held, in which gains are linear, too.
 Values of palettes come last, from the linear problem about the best pattern without them, then about that with them.
 """
 
@@ -36,7 +36,7 @@ from bilayer_core.simulation.gains import alike_but_gains
 from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
 from bilayer_core.simulation.gradients.parameters import Parameter
 from bilayer_core.simulation.simulator import Simulator
-from bilayer_core.studies.shaping.design_result import DesignResult, Shape, rod_of
+from bilayer_core.studies.shaping.design_result import DesignResult, Shape, rod_of, stimuli_text
 from bilayer_core.studies.shaping.pattern import Pattern
 from bilayer_core.studies.shaping.target_curve import TargetCurve, between, read_curve
 from bilayer_core.studies.shaping.varied import Varied, Vary, read_varied
@@ -52,6 +52,8 @@ WEAKEST, STRONGER = 1e-4, 4.0
 """First weight of staying, in parts of the bounds, once a step leads away, and its factor (Levenberg, Marquardt)."""
 SMOOTH = 1e-3
 """w of a pattern of `pattern.POINTS` points: what is left to choose is smooth."""
+ENDS = 1e-3
+"""Weight of where the rod ends along a curve: what the shape leaves to choose, as layers that swell alike, sets it."""
 TURN = 1.0
 """Of the tip, between two shapes on the way to a wanted one in space [rad]."""
 STEEPEST = math.radians(10.0)
@@ -254,7 +256,8 @@ class _Search:
         if angle > STEEPEST:
             raise InputError(
                 f"{curve.source}: begins {math.degrees(angle):.3g}° from the direction in which the rod begins, which "
-                f"is {', '.join(f'{x:.3g}' for x in way)}; allowed are {math.degrees(STEEPEST):g}°: turn the curve"
+                f"is {', '.join(f'{x:.3g}' for x in way)}; allowed are {math.degrees(STEEPEST):g}°: turn the curve "
+                "or reverse it"
             )
         edges = np.diff(made, axis=0)
         lengths = np.linalg.norm(edges, axis=1)
@@ -266,7 +269,8 @@ class _Search:
         if not least / LONGEST <= curve.length <= LONGEST * most:
             raise InputError(
                 f"{curve.source}: is {1e3 * curve.length:.4g} mm long; within these bounds the rod becomes "
-                f"{1e3 * least:.4g} to {1e3 * most:.4g} mm long, and allowed are {LONGEST:g} times more and less"
+                f"{1e3 * least:.4g} to {1e3 * most:.4g} mm long, and allowed are {LONGEST:g} times more "
+                "and less; x, y and z are in m"
             )
         if self._in_plane:
             aside = np.ptp(curve.points @ np.cross(*here.model.rods.axes))
@@ -301,14 +305,24 @@ class _Search:
         ways = [away for away, _ in self._departures(targets)]
         return math.sqrt(np.mean([np.mean((away**2).sum(axis=1)) for away in ways])) / self._size
 
+    def _beyond(self, targets: Sequence[TargetCurve]) -> Array:
+        """Return how far beyond the ends of targets the rod ends, along their last tangents [m]."""
+        tips = [self._curve(here)[-1] for here in self._here]
+        ends = [(target.at(end := np.array([target.length]))[0], target.tangents(end)[0]) for target in targets]
+        return np.array([tangent @ (tip - end) for tip, (end, tangent) in zip(tips, ends, strict=True)])
+
     def _equations(self, targets: Sequence[TargetCurve], slopes: list[Array]) -> tuple[Array, Array]:
-        """Return the Jacobian and the values of distances, over the length of the rod."""
+        """Return the Jacobian and the values of distances, over the length of the rod, and last those of its ends."""
         rows, right = [], []
         for (away, tangents), slope in zip(self._departures(targets), slopes, strict=True):
             across = slope - np.einsum("ia,ib,ibk->iak", tangents, tangents, slope)
-            rows.append(across.reshape(away.size, -1) / self._size)
-            right.append(away.ravel() / self._size)
-        return np.concatenate(rows) / math.sqrt(len(away)), np.concatenate(right) / math.sqrt(len(away))
+            rows.append(across.reshape(away.size, -1) / math.sqrt(len(away)))
+            right.append(away.ravel() / math.sqrt(len(away)))
+        last = [target.tangents(np.array([target.length]))[0] for target in targets]
+        rows.append(ENDS * np.array([tangent @ slope[-1] for tangent, slope in zip(last, slopes, strict=True)]))
+        right.append(ENDS * self._beyond(targets))
+        over = self._size * math.sqrt(len(targets))
+        return np.concatenate(rows) / over, np.concatenate(right) / over
 
     def _angles(self, targets: Sequence[TargetCurve], slopes: list[Array]) -> tuple[Array, Array]:
         """Return the Jacobian and the values of angles of edges in the plane, over those of the targets [rad]."""
@@ -330,7 +344,8 @@ class _Search:
 
     def _left(self, targets: Sequence[TargetCurve]) -> float:
         """Return the root of the sum that steps make smaller."""
-        return math.hypot(self._rms(targets), math.sqrt(self._pattern.roughness(self._values)))
+        ends = ENDS * math.sqrt(np.mean(self._beyond(targets) ** 2)) / self._size
+        return math.hypot(self._rms(targets), ends, math.sqrt(self._pattern.roughness(self._values)))
 
     def _improve(self, targets: Sequence[TargetCurve], steps: int) -> str:
         """Make steps towards targets, and return why they ended."""
@@ -525,13 +540,15 @@ class _Search:
 
     def _out_of_reach(self) -> str:
         """Return along which direction nothing moves the rod though it is away from a target, as a text."""
-        for (away, _), slopes in zip(self._departures(self._targets), self._slopes(), strict=True):
+        for (away, _), slopes, level in zip(self._departures(self._targets), self._slopes(), self._levels, strict=True):
             moved = slopes.swapaxes(1, 2).reshape(-1, 3)
             _, sizes, ways = np.linalg.svd(moved, full_matrices=False)
-            missed = float(np.abs(away @ ways[2]).max())
-            if sizes[2] < FIXED * sizes[0] and missed > CLOSE * self._size:
-                way = ", ".join(f"{abs(x):.3g}" for x in ways[2])
-                return f"; unreachable: {1e3 * missed:.3g} mm along ({way}), where nothing that varies moves the rod"
+            alone = away @ ways[2] if sizes[0] > 0.0 else np.linalg.norm(away, axis=1)
+            missed = float(np.abs(alone).max())
+            if sizes[2] <= FIXED * sizes[0] and missed > CLOSE * self._size:
+                way = f"along ({', '.join(f'{abs(x):.3g}' for x in ways[2].round(3))})"
+                where = way if sizes[0] > 0.0 else f"at {stimuli_text(level)}"
+                return f"; unreachable: {1e3 * missed:.3g} mm {where}, where nothing that varies moves the rod"
         return ""
 
     def _report(self, termination: str, simulator: Simulator) -> DesignResult:
