@@ -165,6 +165,23 @@ def test_angles_of_fibres_along_a_ribbon_that_made_a_curve_in_space_are_found():
     assert found.values[0] == pytest.approx(made, abs=math.radians(0.1))
 
 
+def test_a_ribbon_winds_to_a_helix_on_a_cone_whose_turns_do_not_draw_its_end_away():
+    s = np.linspace(0.0, 1.0, 400)
+    radius = 1.002 * (0.02 - 0.012 * s)
+    curve = np.stack([radius * np.cos(4 * np.pi * s), radius * np.sin(4 * np.pi * s), 0.0501 * s], axis=1)
+    first, then = np.diff(curve[:3], axis=0)
+    first /= np.linalg.norm(first)
+    then -= (then @ first) * first
+    frame = np.stack([first, np.cross(then, first), then])
+    frame /= np.linalg.norm(frame, axis=1, keepdims=True)
+    curve = (curve - curve[0]) @ frame.T  # along the ribbon, and first towards its normal
+    gains = {f"rods.ribbon.layers.{layer}.eigenstrain.gain": (-0.06, 0.06, 40) for layer in ("lower", "upper")}
+    ribbon = {"rods.ribbon.path.length": TargetCurve(curve).length, "rods.ribbon.width": 2e-3}
+    angles = {f"rods.ribbon.layers.{of}.fibres.angle": f"{d} deg" for of, d in (("lower", -45), ("upper", 45))}
+    found = design("helical_ribbon", curve, gains, overrides=ribbon | angles)
+    assert found.rms < 3e-3 and found.shapes[0].ends_apart < 0.05 * found.size
+
+
 def test_all_arms_of_a_swimmer_get_the_pattern_of_the_first_though_they_carry_the_hub_that_holds_it():
     path, gains = "rods.arm.layers.active.eigenstrain.gain", [0.01, 0.03, 0.02]
     profile = {"at": [0.0, 0.05, 0.1], "value": gains}

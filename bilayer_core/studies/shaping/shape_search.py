@@ -293,12 +293,19 @@ class _Search:
                 self.equilibria += 1
 
     def _departures(self, targets: Sequence[TargetCurve]) -> list[tuple[Array, Array]]:
-        """Return ways from targets to the rod [m], and tangents there."""
+        """Return ways from targets to the rod [m], and tangents there; those of shapes on the way from point to point,
+        since sliding along them the rod would go astray.
+        """
         found = []
         for here, target in zip(self._here, targets, strict=True):
             made = self._curve(here)
             lengths = np.linalg.norm(np.diff(made, axis=0), axis=1)
-            found.append(target.departures(made, np.concatenate([[0.0], np.cumsum(lengths)])))
+            along = np.concatenate([[0.0], np.cumsum(lengths)])
+            if targets is self._targets:
+                found.append(target.departures(made, along))
+            else:
+                away = made - target.at(along * (target.length / along[-1]))
+                found.append((away, np.zeros_like(away)))
         return found
 
     def _rms(self, targets: Sequence[TargetCurve]) -> float:
@@ -494,7 +501,7 @@ class _Search:
             self._in_parts(lambda part: self._step(near(part), self._weight))
         else:
             count = math.ceil(max(_turning(target) for target in self._targets) / TURN)
-            for k in range(1, count):
+            for k in range(1, count + 1):
                 self._improve(near(k / count), 2)
 
     def _in_parts(self, go: Callable[[float], bool]) -> None:
