@@ -50,6 +50,7 @@ def design(
     from bilayer_core.studies.shaping import design_files
     from bilayer_core.studies.shaping.shape_search import SMOOTH
     from bilayer_core.studies.shaping.shape_search import design as find_design
+    from bilayer_core.studies.shaping.target_curve import read_curve
 
     directory = None if out is None else output_directory(out)
     if directory is not None:
@@ -58,6 +59,8 @@ def design(
         require("--out: figures", "matplotlib")
         design_files.check_outputs(directory, force)
     at = [_level(text) for text in levels] or None
+    for path in targets:
+        read_curve(path)  # refused before kernels compile
     compile_kernels(quiet)
     found = find_design(
         scene,

@@ -78,7 +78,7 @@ class EdgeFigures:
             self._shear_moduli[index] = self._moduli[index] / (2.0 * (1.0 + material.poisson_ratio))
             of_copies = dict.fromkeys(tuple(variant.layers[index].eigenstrain) for variant in rod.variants)
             ranges = np.array([_eigenstrain_range(scene, rod, layer, laws) for laws in of_copies])
-            along, across, _ = free_strain(layer)
+            along, across, _ = free_strain(layer, along).T
             self.eigenstrain_across[index] = abs(across) * ranges[:, 0].max(axis=0)
             self.eigenstrain[index] = abs(along) * ranges[:, 0].max(axis=0)
             ends = along * np.stack([ranges[:, 1].min(axis=0), ranges[:, 2].max(axis=0)])

@@ -47,7 +47,7 @@ from typing import Any
 
 import numpy as np
 
-from bilayer_core.model.plate_section import Natural, PlateSection, free_strain
+from bilayer_core.model.plate_section import DIRECTIONS, Natural, PlateSection
 from bilayer_core.model.section import bond, sections
 from bilayer_core.model.strands import StrandShape
 from bilayer_core.model.unknown_order import ReadOnlyArrays
@@ -132,7 +132,7 @@ SMALLEST = 1e-6
 def _varying(layer: Layer) -> tuple[float | Profile | None, ...]:
     """Return what may vary along a layer."""
     natural = layer.natural_curvature, layer.natural_curvature_across, layer.natural_twist
-    return layer.thickness, layer.stiffness, *natural
+    return layer.thickness, layer.stiffness, *natural, layer.fibres and layer.fibres.angle
 
 
 def driven_cells(rod: Rod, cells: Cells, layer: Layer, law: Eigenstrain | None = None) -> Array:
@@ -371,7 +371,7 @@ class WholeSection:
         else:
             axial = driven * layer.axial * np.ones_like(layer.ratio)
             strain, bend, free = self._driven_by(axial, -axial * layer.height)
-        along, across, _ = free_strain(self._rod.layers[slot])
+        along, across = DIRECTIONS[self._rod.layers[slot].swelling]
         curl = across * free + self.curl * along * (free - bend)
         return along * strain, along * bend, curl, 0.0 * bend, 0.0 * bend
 

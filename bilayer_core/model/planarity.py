@@ -118,7 +118,8 @@ class _Survey:
             for layer in rod.layers:
                 if layer.natural_curvature_across is not None and any(extremes(layer.natural_curvature_across)):
                     yield f"rods.{rod.name}.layers.{layer.name}.natural_curvature_across leaves {plane}"
-                if layer.fibres is not None and abs(np.sin(2.0 * layer.fibres.angle)) > ROUNDING:
+                least, most = extremes(layer.fibres.angle) if layer.fibres is not None else (0.0, 0.0)
+                if least != most or abs(np.sin(2.0 * least)) > ROUNDING:
                     yield f"rods.{rod.name}.layers.{layer.name}.fibres turn the rod out of {plane}"
                 if any(extremes(layer.natural_twist)):
                     yield f"rods.{rod.name}.layers.{layer.name}.natural_twist turns the rod out of {plane}"

@@ -49,30 +49,36 @@ def is_plate(scene: SceneConfig, rod: Rod) -> bool:
     return len(ratios) > 1 or any(layer.fibres is not None for layer in rod.layers)
 
 
-def _turn(angle: float) -> Array:
-    """Return the matrix that takes strains (ε_x, ε_y, γ) to those along and across fibres at an angle."""
+def _turn(fibres: Fibres, along: Array) -> Array:
+    """Return the matrices that take strains (ε_x, ε_y, γ) to those along and across fibres, shape (n_place, 3, 3)."""
+    angle = values_at(fibres.angle, along)
     c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
+    turn = np.array([[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]])
+    return np.moveaxis(turn, -1, 0)
 
 
-def plane_stiffness(layer: Layer, material: Material) -> Array:
-    """Return Q of a layer, for the multiple 1 of its moduli [Pa], shape (3, 3)."""
+def plane_stiffness(layer: Layer, material: Material, along: Array) -> Array:
+    """Return Q of a layer at lengths along the path [m], for the multiple 1 of its moduli [Pa], shape (n_place, 3,
+    3).
+    """
     fibres = layer.fibres or Fibres(angle=0.0)
-    along, across = (part.stiffness * material.youngs_modulus for part in (fibres.along, fibres.across))
+    stiff, soft = (part.stiffness * material.youngs_modulus for part in (fibres.along, fibres.across))
     ratio = material.poisson_ratio
     shear = fibres.shear * material.youngs_modulus / (2.0 * (1.0 + ratio))
-    share = 1.0 - ratio**2 * across / along
-    own = np.array([[along, ratio * across, 0.0], [ratio * across, across, 0.0], [0.0, 0.0, share * shear]]) / share
-    turn = _turn(fibres.angle)
-    return turn.T @ own @ turn
+    share = 1.0 - ratio**2 * soft / stiff
+    own = np.array([[stiff, ratio * soft, 0.0], [ratio * soft, soft, 0.0], [0.0, 0.0, share * shear]]) / share
+    turn = _turn(fibres, along)
+    return turn.swapaxes(1, 2) @ own @ turn
 
 
-def free_strain(layer: Layer) -> Array:
-    """Return the strain (ε_x, ε_y, γ) of a layer by itself per unit of its eigenstrain."""
+def free_strain(layer: Layer, along: Array) -> Array:
+    """Return the strain (ε_x, ε_y, γ) of a layer by itself per unit of its eigenstrain at lengths along the path [m],
+    shape (n_place, 3).
+    """
     if layer.fibres is None:
-        return np.array([*DIRECTIONS[layer.swelling], 0.0])
+        return np.tile([*DIRECTIONS[layer.swelling], 0.0], (len(along), 1))
     own = np.array([layer.fibres.along.swelling, layer.fibres.across.swelling, 0.0])
-    return np.linalg.solve(_turn(layer.fibres.angle), own)
+    return np.linalg.solve(_turn(layer.fibres, along), own[:, None])[..., 0]
 
 
 @dataclass(frozen=True)
@@ -113,12 +119,13 @@ class PlateSection:
     def __init__(self, scene: SceneConfig, rod: Rod, along: Array, present: Array):
         """Take lengths along the path [m], shape (n_place,), and which layers are there, shape (n_layer, n_place)."""
         self._layers, self._materials = rod.layers, [scene.materials[layer.material] for layer in rod.layers]
+        self._along = along
         whole = [values_at(layer.thickness, along) for layer in rod.layers]
         self._height = [0.0 * whole[0]] if len(whole) == 1 else [-0.5 * whole[0], 0.5 * whole[1]]
         self._thickness = [there * h for there, h in zip(present, whole, strict=True)]
         self._multiple = [values_at(layer.stiffness, along) for layer in rod.layers]
         self._stiffness = [
-            multiple[:, None, None] * plane_stiffness(layer, material)
+            multiple[:, None, None] * plane_stiffness(layer, material, along)
             for multiple, layer, material in zip(self._multiple, self._layers, self._materials, strict=True)
         ]
         parts = [
@@ -195,7 +202,7 @@ class PlateSection:
         """Return the free plate of an eigenstrain 1 of one layer, or of one that grows by 1 through its thickness and
         is 0 on average.
         """
-        pull = self._stiffness[slot] @ free_strain(self._layers[slot])
+        pull = (self._stiffness[slot] @ free_strain(self._layers[slot], self._along)[..., None])[..., 0]
         h, z = self._thickness[slot][:, None], self._height[slot][:, None]
         return self._free(0.0 * pull, -pull * h**2 / 12.0) if gradient else self._free(pull * h, -pull * h * z)
 

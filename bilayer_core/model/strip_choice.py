@@ -13,6 +13,7 @@ from bilayer_core.model.plate_section import PlateSection, is_plate, plate_secti
 from bilayer_core.model.plate_strip import StripLaw, folding_ratio
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.diffusion_modes import strains_at
+from bilayer_core.scene.profile import Profile
 from bilayer_core.scene.rod import Rod
 
 MOST = 0.01
@@ -191,11 +192,13 @@ def _of_fibres(
     size = bend**2 + twist**2
     if size > 0.0:
         ratio = float((at_edges.width**2 / at_edges.thickness).max()) * size**0.5
+        vary = any(layer.fibres and isinstance(layer.fibres.angle, Profile) for layer in rod.layers)
+        most = "in its middle" if vary else "at most"
         helix = f"radius {1e3 * abs(bend) / size:.3g} mm and pitch {2e3 * np.pi * abs(twist) / size:.3g} mm"
         yield Figure(
             where,
             "its fibres bend and twist it, where it is narrow, to",
-            f"{bend:.3g} and {twist:.3g} 1/m at most (w²κ/H {ratio:.2g})",
+            f"{bend:.3g} and {twist:.3g} 1/m {most} (w²κ/H {ratio:.2g})",
             f"a helix of {helix}",
             0.0,
         )

@@ -61,7 +61,7 @@ class FibreDirection(Part):
 class Fibres(Part):
     """Aligned fibres in a layer: it swells and is stiff along them as not across them."""
 
-    angle: Angle
+    angle: varying(Angle)
     """From the path to the fibres, counter-clockwise as seen from where the rod's normal points. The mirror images of a
     pattern have the opposite one.
     """
@@ -378,6 +378,8 @@ def faults_of_rod(rod: Rod) -> list[Fault]:
     for index, layer in enumerate(rod.layers):
         faults += _bent_across(rod, index)
         faults += _profiles(layer, ("layers", index), VARYING, rod.path.length)
+        if layer.fibres is not None:
+            faults += _profiles(layer.fibres, ("layers", index, "fibres"), ("angle",), rod.path.length)
         for number, law in enumerate(layer.eigenstrain):
             where: Location = ("layers", index, "eigenstrain", number, "interval")
             faults += _profiles(law, where[:-1], ("gain",), rod.path.length)
@@ -535,6 +537,11 @@ def _faults_of_closed(rod: Rod) -> Iterator[Fault]:
                 demand = f"must be the same where a closed path starts and ends, is {first:g} and {last:g} there"
                 yield (*where, key), "a profile", demand
     for index, layer in enumerate(rod.layers):
+        if layer.fibres is not None:
+            first, last = values_at(layer.fibres.angle, np.array([0.0, rod.path.length]))
+            if abs(math.sin(first - last)) > ROUNDING:
+                demand = "must be the same direction where a closed path starts and ends, as angles 180° apart are"
+                yield ("layers", index, "fibres", "angle"), "a profile", demand
         covered = rod.covered_stations(layer)
         if covered[0] < 1 and covered != (0, rod.stations - 1):
             demand = (
@@ -625,7 +632,7 @@ def _sharp_bends(rod: Rod) -> Iterator[Fault]:
 
 
 def _profiles(
-    part: Rod | Layer | Eigenstrain, where: Location, keys: tuple[str, ...], length: float
+    part: Rod | Layer | Eigenstrain | Fibres, where: Location, keys: tuple[str, ...], length: float
 ) -> Iterator[Fault]:
     """Yield a fault for each place of a profile that lies beyond the end of a path of given length [m]."""
     for key in keys:

@@ -110,6 +110,8 @@ def varied(part=0.7, **how):
     bottom["interval"] = [0.0, part * length]
     top["thickness"] = {"at": [0.0, length], "value": [0.2e-3, 0.3e-3]}
     top["stiffness"] = {"at": [0.3 * length, 0.6 * length], "value": [1.0, 2.0]}
+    if "fibres" in top:
+        top["fibres"] |= {"angle": {"at": [0.0, length], "value": [-0.4, 1.2]}}
     return content
 
 
@@ -168,6 +170,45 @@ def test_crossed_layers_that_grow_thicker_bend_and_twist_by_the_thickness_of_the
     whole = 2.0 * np.interp(np.linspace(0.0, length, 41), [0.0, length], [0.1e-3, 0.2e-3])[1:-1]
     wanted = 1.5 * 0.5e-3 / whole[:, None] * [math.cos(math.pi / 3.0), math.sin(math.pi / 3.0)]
     assert np.abs(rest(content)) == pytest.approx(wanted, rel=2e-3)
+
+
+def turning(*degrees, stations=41):
+    """The strip of `crossed`, whose fibres turn along it, so narrow and swelling so little that it stays a beam."""
+    content = crossed(0.0, 1e-3, stations, fibres={"across": {"swelling": 0.0}})
+    length = content["rods"][0]["path"]["length"]
+    for own, more in zip(content["rods"][0]["layers"], (0.0, 90.0), strict=True):
+        value = [f"{angle + more} deg" for angle in degrees]
+        own |= {"thickness": 0.15e-3, "eigenstrain": {**HUMID, "gain": 1e-3}}
+        own["fibres"] |= {"angle": {"at": np.linspace(0.0, length, len(degrees)).tolist(), "value": value}}
+    return content
+
+
+def test_fibres_that_turn_along_a_strip_bend_and_twist_it_by_the_angle_of_the_place():
+    angle = 2.0 * np.radians(np.linspace(-20.0, 40.0, 41))[1:-1]
+    wanted = 1.5 * 0.5e-3 / 0.3e-3 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    assert np.abs(rest(turning(-20.0, 40.0)) - wanted).max() < 3e-3
+
+
+def test_fibres_that_turn_along_a_strip_leave_its_plane():
+    for degrees in ((0.0, 90.0), (20.0, 20.0)):
+        with pytest.raises(SceneError, match=r"rods\.rod\.layers\.bottom\.fibres turn the rod out of the plane"):
+            Simulator(load_scene(turning(*degrees)), model="laminate", dimension=2)
+
+
+def test_profiles_of_angles_must_lie_on_the_path_and_close_with_it():
+    content = turning(0.0, 90.0)
+    content["rods"][0]["layers"][1]["fibres"]["angle"]["at"][1] = 0.2
+    with pytest.raises(
+        SceneError, match=r"layers\.top\.fibres\.angle\.at\[1\]: found 0.2; must be a length \[m\] along"
+    ):
+        load_scene(content)
+    round_path = {"shape": "arc", "start": [0, 0, 0], "direction": [1, 0, 0], "radius": 0.05, "angle": "1 turn"}
+    rings = [turning(0.0, last) for last in (180.0, 90.0)]
+    for content in rings:
+        content["rods"][0] |= {"path": round_path | {"closed": True}, "clamp_start": None}
+    load_scene(rings[0])
+    with pytest.raises(SceneError, match='angle: found "a profile"; must be the same direction where a closed path'):
+        load_scene(rings[1])
 
 
 @pytest.mark.parametrize(("width", "thin"), [(4e-3, 1.0), (20e-3, 0.1)])

@@ -5,6 +5,7 @@ import pytest
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, SceneError
+from bilayer_core.simulation.at_rest import equilibrium_of
 
 GAIN = "rods.strip.layers.active.eigenstrain.gain"
 HANGING = {"gravity": [0, 0, -9.81]}
@@ -124,3 +125,16 @@ def test_a_pattern_multiplies_a_profile_of_gains():
     turned = [simulator.rods[name].curvature[20] for name in ("strip_0", "strip_1")]
     alone = [at_rest(sloping(3, (0.0, end))).rods["strip"].curvature[20] for end in (0.01, 0.005)]
     assert turned == pytest.approx(alone, rel=1e-6)
+
+
+@pytest.mark.parametrize("path", ["rods.strip.layers.active.thickness", f"{GAIN}.value.1", "swelling"])
+def test_an_equilibrium_that_goes_to_other_gains_then_moves_as_one_that_was_built_with_them(path):
+    gains, found = {**sloping(5), "value": [0.03, -0.02, 0.01, 0.0, 0.02]}, []
+    for begin in (sloping(5), gains):
+        here, name = equilibrium_of(at_rest(begin, **{"rods.strip.section": "beam"})), f"{GAIN}.value"
+        here.go_to(here.parameters([name])[name], gains["value"])
+        assert here.scene.rods[0].layers[1].eigenstrain[0].gain.value == gains["value"]
+        found.append([here.velocities(here.parameters([path])[path]), here.respond(*here.parameters([path])[path])])
+    (other, response), (own, again) = found
+    assert other == pytest.approx(own, rel=1e-6, abs=1e-6 * np.abs(own).max())
+    assert np.abs((response.motion + again.motion * -1.0).unknowns).max() < 1e-6 * np.abs(again.motion.unknowns).max()

@@ -10,7 +10,8 @@ import yaml
 
 from bilayer_core import Simulator, design, load_scene
 from bilayer_core.cli import main
-from bilayer_core.errors import InputError, SceneError
+from bilayer_core.errors import InputError, SceneError, SimulationError
+from bilayer_core.studies.shaping.shape_search import _Search
 from bilayer_core.studies.shaping.target_curve import TargetCurve, between, read_curve
 
 GAIN = "rods.strip.layers.active.eigenstrain.gain"
@@ -19,13 +20,13 @@ PLACES = np.linspace(0.0, LENGTH, 100)
 PATTERN = 0.01 + 0.02 * np.sin(2.0 * np.pi * PLACES / LENGTH)
 
 
-def curve_of(overrides, stimulus=1.0):
+def curve_of(overrides, stimulus=1.0, scene="bending", channel="swelling", rod="strip"):
     """The curve between the strands of a strip, in equilibrium."""
-    simulator = Simulator(load_scene("bending", overrides))
-    simulator.set_stimulus("swelling", stimulus)
+    simulator = Simulator(load_scene(scene, overrides))
+    simulator.set_stimulus(channel, stimulus)
     simulator.solve_static()
-    strands = {strand.name: strand.nodes for strand in simulator.description.strands}
-    return np.mean([simulator.positions[nodes] for nodes in strands.values()], axis=0)
+    strands = [strand.nodes for strand in simulator.description.strands if strand.rod == rod]
+    return np.mean([simulator.positions[nodes] for nodes in strands], axis=0)
 
 
 @pytest.fixture(scope="module")
@@ -60,13 +61,51 @@ def test_one_pattern_serves_two_shapes_at_two_stimuli():
     assert len(found.shapes) == 2
 
 
-@pytest.mark.parametrize("kind", [HANGING | {"rods.strip.width": 2e-3}, {"rods.strip.width": 10e-3}])
-def test_a_film_that_sags_or_curls_across_on_the_way_becomes_a_u(kind):
+def film(**kind):
+    """What makes a film become the U of an arc between two straight ends."""
     turn = math.pi * np.clip(np.linspace(-1.0, 2.0, 120), 0.0, 1.0)
     steps = np.stack([np.cos(turn), 0.0 * turn, np.sin(turn)], axis=1) * LENGTH / 119
     thin = {f"rods.strip.layers.{layer}.thickness": 0.2e-3 for layer in ("passive", "active")}
-    found = design("bending", np.cumsum(steps, axis=0), {GAIN: (-0.2, 0.2, 30)}, overrides=kind | thin)
+    return design("bending", np.cumsum(steps, axis=0), {GAIN: (-0.2, 0.2, 30)}, overrides=kind | thin)
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        HANGING | {"rods.strip.width": 2e-3},
+        {"rods.strip.width": 10e-3},
+        {"rods.strip.width": 40e-3},
+        HANGING | {"rods.strip.width": 40e-3},
+    ],
+)
+def test_a_film_that_sags_or_curls_across_on_the_way_becomes_a_u(kind):
+    found = film(**kind)
     assert found.rms < 2e-4
+    assert found.scene.rods[0].section == "auto" and found.scene.solver.model == "auto"
+
+
+def test_the_report_says_whether_the_rod_comes_to_its_shape_from_the_start_of_the_scene(drawn):
+    wide = film(**{"rods.strip.width": 40e-3})
+    assert "but from the start of the scene the rod comes to another shape" in str(wide)
+    simulator = Simulator(wide.scene)
+    simulator.set_stimulus("swelling", 1.0)
+    simulator.solve_static()
+    assert np.abs(simulator.positions - wide.shapes[0].made).max() > 0.1 * LENGTH
+    assert design("bending", drawn, {GAIN: (-0.05, 0.05, 20)}, overrides=HANGING).shapes[0].reached
+
+
+def test_what_was_found_is_kept_where_the_sections_of_the_pattern_have_no_equilibrium(monkeypatch):
+    built = _Search._built
+
+    def folding(self, *what):
+        if "strip" in self._sections.values():
+            raise SimulationError("folds", 0.0)
+        return built(self, *what)
+
+    monkeypatch.setattr(_Search, "_built", folding)
+    found = film(**{"rods.strip.width": 20e-3})
+    assert "no equilibrium is near with its own sections (rods.strip.section: strip" in found.termination
+    assert found.rms < 2e-4 and found.shapes[0].stable and found.scene.rods[0].section == "beam"
 
 
 def test_bounds_that_limit_a_shape_are_reported_with_the_distance():
@@ -86,10 +125,81 @@ def test_a_strip_lies_on_a_post_with_a_pattern_that_is_found_through_contact():
     assert found.values[0] == pytest.approx([0.0, 0.01, 0.0], abs=1e-3)
 
 
+def test_two_layers_that_swell_make_the_rod_as_long_as_the_curve_and_one_says_what_is_left():
+    turn = 0.5 * np.sin(np.linspace(0.0, 2.0 * math.pi, 60))
+    curve = np.cumsum(np.stack([np.cos(turn), 0.0 * turn, np.sin(turn)], axis=1) * 0.107 / 59, axis=0)
+    other, law = "rods.strip.layers.passive.eigenstrain", {"stimulus": "swelling", "gain": 0.01}
+    both = design("bending", curve, {GAIN: (-0.1, 0.1, 20), f"{other}.gain": (-0.1, 0.1, 20)}, overrides={other: law})
+    assert both.shapes[0].ends_apart < 5e-4 and both.rms < 1e-4
+    one = design("bending", curve, {GAIN: (-0.1, 0.1, 20)})
+    assert one.shapes[0].ends_apart > 5e-3 and one.rms < 1e-4
+    assert f"ends {1e3 * one.shapes[0].ends_apart:.3g} mm apart" in str(one)
+
+
+def test_a_shape_at_a_stimulus_at_which_nothing_acts_is_told_as_unreachable():
+    levels = [{"swelling": 1.0}, {"swelling": 0.0}]
+    found = design("bending", [straight(0.1)] * 2, {GAIN: (-0.05, 0.05, 5)}, at=levels, overrides=HANGING)
+    assert re.search(r"unreachable: 3\.\d+ mm at swelling = 0, where nothing that varies moves", found.termination)
+
+
 def test_thickness_of_a_layer_is_a_pattern_too():
     wanted = curve_of({"rods.strip.layers.active.thickness": 1.3e-3})
     found = design("bending", wanted, {"rods.strip.layers.active.thickness": (0.5e-3, 2e-3)})
     assert found.values[0] == pytest.approx([1.3e-3], rel=1e-2)
+
+
+def test_angles_of_fibres_along_a_ribbon_that_made_a_curve_in_space_are_found():
+    """Which lies flat at first, so that its plane is left."""
+    angle, only = "rods.ribbon.layers.lower.fibres.angle", "rods.ribbon.layers.upper"
+    ribbon = {f"{only}.fibres": None, f"{only}.eigenstrain": None, "rods.ribbon.width": 2e-3} | {
+        "rods.ribbon.stations": 31,
+        "rods.ribbon.path.length": 0.05,
+        angle: "90 deg",
+    }
+    made = np.radians([70.0, 95.0, 120.0, 100.0])
+    profile = {"at": [0, 0.015, 0.035, 0.05], "value": made.tolist()}
+    curve = curve_of(ribbon | {angle: profile}, 1.0, "helical_ribbon", "humidity", "ribbon")
+    flat = ribbon | {angle: profile | {"value": [math.pi / 2.0] * 4}}
+    found = design("helical_ribbon", curve, [f"{angle}=45 deg:135 deg"], overrides=flat)
+    assert found.rms < 1e-6
+    assert found.values[0] == pytest.approx(made, abs=math.radians(0.1))
+
+
+def test_a_ribbon_winds_to_a_helix_on_a_cone_whose_turns_do_not_draw_its_end_away():
+    s = np.linspace(0.0, 1.0, 400)
+    radius = 1.002 * (0.02 - 0.012 * s)
+    curve = np.stack([radius * np.cos(4 * np.pi * s), radius * np.sin(4 * np.pi * s), 0.0501 * s], axis=1)
+    first, then = np.diff(curve[:3], axis=0)
+    first /= np.linalg.norm(first)
+    then -= (then @ first) * first
+    frame = np.stack([first, np.cross(then, first), then])
+    frame /= np.linalg.norm(frame, axis=1, keepdims=True)
+    curve = (curve - curve[0]) @ frame.T  # along the ribbon, and first towards its normal
+    gains = {f"rods.ribbon.layers.{layer}.eigenstrain.gain": (-0.06, 0.06, 40) for layer in ("lower", "upper")}
+    ribbon = {"rods.ribbon.path.length": TargetCurve(curve).length, "rods.ribbon.width": 2e-3}
+    angles = {f"rods.ribbon.layers.{of}.fibres.angle": f"{d} deg" for of, d in (("lower", -45), ("upper", 45))}
+    found = design("helical_ribbon", curve, gains, overrides=ribbon | angles)
+    assert found.rms < 3e-3 and found.shapes[0].ends_apart < 0.05 * found.size
+
+
+def test_all_arms_of_a_swimmer_get_the_pattern_of_the_first_though_they_carry_the_hub_that_holds_it():
+    path, gains = "rods.arm.layers.active.eigenstrain.gain", [0.01, 0.03, 0.02]
+    profile = {"at": [0.0, 0.05, 0.1], "value": gains}
+    wanted = curve_of({path: profile}, 1.0, "swimming", "light", "arm_0")
+    found = design("swimming", wanted, {path: (0.0, 0.1)}, overrides={path: profile | {"value": [0.05] * 3}})
+    assert found.values[0] == pytest.approx(gains, abs=1e-5)
+    assert found.largest < 1e-5 and found.shapes[0].reached
+    assert "of arm_0, the first of 8 copies, from the target" in str(found)
+
+
+def test_the_first_rod_that_a_path_names_is_shaped():
+    along, across = (f"rods.{name}.layers.active.eigenstrain.gain" for name in ("along", "across"))
+    wanted = curve_of({along: 0.004}, 1.0, "films", "humidity", "along")
+    assert design("films", wanted, {"gravity.2": (-1.0, 1.0), along: (0.0, 0.01)}).rms < 1e-4
+    with pytest.raises(InputError, match="rods.across.*gain: acts on nothing of rods.along at these stimuli"):
+        design("films", wanted, {along: (0.0, 0.01), across: (0.0, 0.01)})
+    with pytest.raises(InputError, match=r"vary gravity\.2: names none of the rods along, all_around, across; the fir"):
+        design("films", wanted, {"gravity.2": (-1.0, 1.0)})
 
 
 def test_pieces_of_a_palette_that_made_a_shape_are_found():
@@ -107,6 +217,11 @@ def test_pieces_of_two_materials_come_near_a_shape_that_needs_others(drawn):
     assert found.rms < 0.01
     gain = found.scene.rods[0].layers[1].eigenstrain[0].gain
     assert np.abs(curve_of(HANGING | {GAIN: {"at": gain.at, "value": gain.value}}) - found.shapes[0].made).max() < 1e-9
+
+
+def test_more_pieces_of_a_palette_than_stations_come_nearer_than_few(drawn):
+    few, many = (design("bending", drawn, [f"{GAIN}=-5%,0,5%:{pieces}"], overrides=HANGING) for pieces in (20, 100))
+    assert many.rms < 0.2 * few.rms
 
 
 def test_a_layer_takes_the_film_next_to_the_thickness_that_is_best():

@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +28,8 @@ from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.model.model import Model
 from bilayer_core.model.state import State
 from bilayer_core.observed.frame import Description
+from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.loader import load_content, scene_content
 from bilayer_core.simulation.equilibrium import solve_static
 from bilayer_core.simulation.gains import put_gains
 from bilayer_core.simulation.gradients.nearby import (
@@ -102,6 +105,8 @@ class Equilibrium:
     ----------
     residual : float
         Largest displacement that Newton's method still made at `state` [m].
+    scene : SceneConfig
+        With the present gains.
 
     Raises
     ------
@@ -120,8 +125,8 @@ class Equilibrium:
     ):
         model, self._description, self._builders = stepper.model, description, builders
         self._start = builders.state_of(model)
-        self.scene, self._size = model.scene, max(rod.path.length for rod in model.scene.rods)
-        self._gains = model.drives.law_gain.copy()
+        self._scene, self._size = model.scene, max(rod.path.length for rod in model.scene.rods)
+        self._gains, self._changes = model.drives.law_gain.copy(), dict[str, float]()
         arrays = {name: getattr(model.drives, name) for name in model.drives.names}
         self.model = replace(model, drives=type(model.drives)(**arrays | {"law_gain": self._gains.copy()}))
         self._stepper, self._evaluator = builders.stepper_of(self.model), Evaluator(self.model)
@@ -162,9 +167,10 @@ class Equilibrium:
         return self._state.position
 
     @property
-    def gains(self) -> Array:
-        """Those of laws, a copy, shape (n_law,)."""
-        return self._gains.copy()
+    def scene(self) -> SceneConfig:
+        if self._changes:
+            self._scene, self._changes = load_content(scene_content(self._scene), self._changes), {}
+        return self._scene
 
     def fits(self, model: Model) -> bool:
         """Return whether states of a model have the same unknowns."""
@@ -177,8 +183,8 @@ class Equilibrium:
         for part in ("position", "body_position", *HELD):
             getattr(state, part)[:] = getattr(self._state, part)
 
-    def go_to(self, gains: Array) -> None:
-        """Go to the equilibrium with other gains of laws, shape (n_law,).
+    def go_to(self, gains: Sequence[Parameter], values: Sequence[float]) -> None:
+        """Go to the equilibrium with other values of parameters, all of which are gains of laws.
 
         Raises
         ------
@@ -187,21 +193,23 @@ class Equilibrium:
         """
         before = self.kept()
         try:
-            self._gains[:] = gains
-            put_gains(self.model, gains)
+            for parameter, value in zip(gains, values, strict=True):
+                self._gains[parameter.laws] = value
+            self._changes = self._changes | {of.name: value for of, value in zip(gains, values, strict=True)}
+            put_gains(self.model, self._gains)
             solve_static(self._stepper, self._state)
             self._settle()
         except SimulationError:
             self.return_to(before)
             raise
 
-    def kept(self) -> tuple[Array, State]:
-        """Return gains and shape for `return_to`."""
-        return self._gains.copy(), self._state.copy()
+    def kept(self) -> tuple[Any, ...]:
+        """Return gains, scene and shape for `return_to`."""
+        return self._gains.copy(), self._scene, self._changes, self._state.copy()
 
-    def return_to(self, kept: tuple[Array, State]) -> None:
+    def return_to(self, kept: tuple[Any, ...]) -> None:
         """Go back to gains and the equilibrium that was found with them."""
-        self._gains[:], self._state = kept[0], kept[1].copy()
+        self._gains[:], self._scene, self._changes, self._state = *kept[:3], kept[3].copy()
         self._settle()
 
     def velocities(self, parameters: Sequence[Parameter]) -> Array:
@@ -279,7 +287,7 @@ class Equilibrium:
         """
         found = {name: list(self._parameters_of(name)) for name in names}
         numbers = [(p.name, p.value) for of in found.values() for p in of]
-        laws = laws_of(self.model, self._builders.model_of, numbers)
+        laws = laws_of(replace(self.model, scene=self.scene), self._builders.model_of, numbers)
         return {
             name: [self._of_laws(p, laws[p.name]) if p.name in laws else p for p in of] for name, of in found.items()
         }

@@ -44,8 +44,10 @@ def report_of(result: DesignResult) -> dict[str, Any]:
                 "stimulus": shape.stimulus,
                 "target_length": shape.target.length,
                 "length": shape.length,
+                "ends_apart": shape.ends_apart,
                 "largest_distance": float(shape.distances.max()) / result.size,
                 "stable": shape.stable,
+                "reached_from_the_start": shape.reached,
                 "made": shape.made.tolist(),
             }
             for shape in result.shapes

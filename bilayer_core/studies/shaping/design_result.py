@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from bilayer_core.errors import InputError
 from bilayer_core.scene.config import SceneConfig
+from bilayer_core.scene.rod import Rod
 from bilayer_core.studies.shaping.target_curve import TargetCurve
 from bilayer_core.studies.shaping.varied import Varied
 
@@ -34,6 +34,8 @@ class Shape:
     length : float
         Of the rod there [m].
     stable : bool
+    reached : bool
+        Whether the rod comes there from the start of the scene, at once or as stimuli rise.
     """
 
     target: TargetCurve
@@ -42,6 +44,18 @@ class Shape:
     distances: Array
     length: float
     stable: bool
+    reached: bool
+
+    @property
+    def ends_apart(self) -> float:
+        """Distance of the end of the rod from that of the target [m]."""
+        return float(np.linalg.norm(self.made[-1] - self.target.points[-1]))
+
+    @property
+    def state(self) -> str:
+        """A word or two on `stable` and `reached`."""
+        reached = "" if self.reached else ", but from the start of the scene the rod comes to another shape"
+        return ("stable" if self.stable else "UNSTABLE") + reached
 
 
 @dataclass(frozen=True)
@@ -80,8 +94,8 @@ class DesignResult:
         return self._rod.path.length
 
     @property
-    def _rod(self) -> Any:
-        return next(rod for rod in self.scene.rods if rod.name == rod_of(self.scene, self.varied))
+    def _rod(self) -> Rod:
+        return rod_of(self.scene, self.varied)
 
     @property
     def largest(self) -> float:
@@ -94,16 +108,19 @@ class DesignResult:
         return math.sqrt(np.mean([np.mean(shape.distances**2) for shape in self.shapes])) / self.size
 
     def __str__(self) -> str:
+        copies = self._rod.copy_names
+        copies = f" of {copies[0]}, the first of {len(copies)} copies," if len(copies) > 1 else ""
         lines = [
             f"{self.scene.name}: {sum(map(len, self.values))} values, {self.equilibria} equilibria; {self.termination}",
-            f"  distance from the target: at most {100 * self.largest:.3g} %, rms {100 * self.rms:.3g} % of the rod",
+            f"  distance{copies} from the target: at most {100 * self.largest:.3g} %, rms {100 * self.rms:.3g} % of "
+            "the rod",
         ]
         for shape in self.shapes:
-            at = ", ".join(f"{name} = {value:g}" for name, value in shape.stimulus.items()) or "no stimulus"
             away = f", at most {100.0 * shape.distances.max() / self.size:.3g} % away" if len(self.shapes) > 1 else ""
             lines.append(
-                f"  at {at}: {shape.target.source} is {1e3 * shape.target.length:.4g} mm long, the rod "
-                f"{1e3 * shape.length:.4g} mm{away}; {'stable' if shape.stable else 'UNSTABLE'}"
+                f"  at {stimuli_text(shape.stimulus)}: {shape.target.source} is {1e3 * shape.target.length:.4g} mm "
+                f"long, the rod {1e3 * shape.length:.4g} mm, ends {1e3 * shape.ends_apart:.3g} mm apart{away}; "
+                f"{shape.state}"
             )
         if self.at_bounds:
             lines.append(f"  values at their bounds, which limit the shape: {self.at_bounds}")
@@ -112,18 +129,24 @@ class DesignResult:
         return "\n".join(lines)
 
 
-def rod_of(scene: SceneConfig, varied: Sequence[Varied]) -> str:
-    """Return the name of the rod that is shaped: the only one, or that of the first path.
+def stimuli_text(level: Mapping[str, float]) -> str:
+    """Return values of stimuli as a text."""
+    return ", ".join(f"{name} = {value:g}" for name, value in level.items()) or "no stimulus"
+
+
+def rod_of(scene: SceneConfig, varied: Sequence[Varied]) -> Rod:
+    """Return the rod that is shaped: the only one, or the first that a path names.
 
     Raises
     ------
     InputError
         If it is not told which.
     """
-    names = [name for rod in scene.rods for name in rod.copy_names]
-    if len(names) == 1:
-        return names[0]
-    keys = varied[0].path.split(".")
-    if keys[0] == "rods" and keys[1] in names:
-        return keys[1]
-    raise InputError(f"vary {varied[0].path}: names no single rod, of which there are {', '.join(names)}")
+    named = {f"rods.{key}": rod for k, rod in enumerate(scene.rods) for key in (rod.name, k)}
+    found = [named[key] for key in (".".join(v.path.split(".")[:2]) for v in varied) if key in named] or scene.rods
+    if len(found) > 1 and found is scene.rods:
+        names = ", ".join(rod.name for rod in scene.rods)
+        raise InputError(
+            f"vary {varied[0].path}: names none of the rods {names}; the first that a path names is shaped"
+        )
+    return found[0]

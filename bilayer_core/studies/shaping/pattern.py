@@ -22,8 +22,8 @@ from bilayer_core.studies.shaping.varied import Varied
 Array = np.ndarray
 POINTS = 100
 """Of the pattern whose roughness has the given weight; that of others goes as the square of their number."""
-FAINT = 1e-6
-"""Weight of staying, where the last pieces of a palette move nothing."""
+FAINT = 1e-4
+"""Weight of staying: pieces that cannot be told apart stay near what is best without a palette, within its bounds."""
 SWEEPS = 20
 """Most passes over the pieces of palettes."""
 

@@ -5,13 +5,13 @@ the bounds of p,
 
     Σ |d_i + ∂d_i/∂p δp|²/L² + w² Σ (second differences of the pattern, in parts of its bounds)²
 
-with d_i the way of station i from the nearest point of the wanted curve (Gauss and Newton). Sliding along the curve
-costs nothing, as a drawn curve does not say how the strip is stretched. A step that makes this sum larger is made
-again with a weight of staying. Far away this is no good: in a plane, the first step takes angles of edges in place of
-distances, in which free strips are linear; in space, wanted shapes are approached through shapes that bend less.
-Strips that sag or curl across may come to rest elsewhere: a pattern may be right, and yet the way to its shape not. So
-where the first step leads astray, shapes that bend less are followed in a plane as well, without weight; then weight
-comes back while the shape is held, in which gains are linear, too.
+with d_i the way of station i from the nearest point of the wanted curve (Gauss and Newton). A drawn curve does not say
+how the strip is stretched: sliding along it costs nothing, but a little at its end. A step that makes this sum larger
+is made again with a weight of staying. Far away this is no good: in a plane, the first step takes angles of edges in
+place of distances, in which free strips are linear; in space, wanted shapes are approached through shapes that bend
+less. Strips that sag or curl across may come to rest elsewhere: a pattern may be right, and yet the way to its shape
+not. So where the first step leads astray, shapes that bend less are followed in a plane as well, without weight; then
+weight comes back while the shape is held, in which gains are linear, too.
 Values of palettes come last, from the linear problem about the best pattern without them, then about that with them.
 """
 
@@ -25,7 +25,9 @@ from typing import Any
 
 import numpy as np
 
-from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.errors import InputError, SceneError, SimulationError
+from bilayer_core.model.plan import best_dimension, simplest_model
+from bilayer_core.model.strip_choice import section_of
 from bilayer_core.scene.config import SceneConfig
 from bilayer_core.scene.loader import load_content, load_scene, scene_content
 from bilayer_core.scene.overrides import Overrides
@@ -34,7 +36,7 @@ from bilayer_core.simulation.gains import alike_but_gains
 from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
 from bilayer_core.simulation.gradients.parameters import Parameter
 from bilayer_core.simulation.simulator import Simulator
-from bilayer_core.studies.shaping.design_result import DesignResult, Shape, rod_of
+from bilayer_core.studies.shaping.design_result import DesignResult, Shape, rod_of, stimuli_text
 from bilayer_core.studies.shaping.pattern import Pattern
 from bilayer_core.studies.shaping.target_curve import TargetCurve, between, read_curve
 from bilayer_core.studies.shaping.varied import Varied, Vary, read_varied
@@ -50,6 +52,8 @@ WEAKEST, STRONGER = 1e-4, 4.0
 """First weight of staying, in parts of the bounds, once a step leads away, and its factor (Levenberg, Marquardt)."""
 SMOOTH = 1e-3
 """w of a pattern of `pattern.POINTS` points: what is left to choose is smooth."""
+ENDS = 1e-3
+"""Weight of where the rod ends along a curve: what the shape leaves to choose, as layers that swell alike, sets it."""
 TURN = 1.0
 """Of the tip, between two shapes on the way to a wanted one in space [rad]."""
 STEEPEST = math.radians(10.0)
@@ -64,6 +68,10 @@ ASTRAY, SHORTEST = 0.2, 1.0 / 64.0
 """Largest error of linear equations about a step, of what it was to mend, and the shortest step, of the whole way."""
 FIXED = 1e-9
 """Motion of the rod along one direction, of that along another, that is none."""
+AMONG = 0.381966
+"""Part of the way between bounds at which no value is likely to be special."""
+RISES = 10
+"""Parts in which stimuli rise."""
 AT_BOUND = 1e-6
 """Part of the way between bounds."""
 
@@ -126,7 +134,20 @@ def design(
     if not 0.0 <= smoothness < math.inf:
         raise InputError(f"smoothness: {smoothness} is not allowed; it must be a finite number from 0 up")
     config, varied = read_varied(config, vary)
+    config = _in_space(config, varied)
     return _Search(config, varied, curves, levels, smoothness, progress).result()
+
+
+def _in_space(scene: SceneConfig, varied: list[Varied]) -> SceneConfig:
+    """Return the scene in space, if only its present values keep it in a plane."""
+    changes = {
+        path: of for v in varied for path, of in v.changes(v.low + AMONG * (v.high - v.low) + 0.0 * v.start).items()
+    }
+    with contextlib.suppress(SceneError):
+        other = load_content(scene_content(scene), changes)
+        if scene.solver.dimension == "auto" and best_dimension(scene)[0] < best_dimension(other)[0]:
+            return load_content(scene_content(scene), {"solver.dimension": 3})
+    return scene
 
 
 class _Search:
@@ -148,6 +169,7 @@ class _Search:
         owners = self._pattern.split(np.arange(len(self._values)))
         self._owner = np.concatenate([v.in_scene(own) for v, own in zip(varied, owners, strict=True)])
         self.equilibria, self._weight, self._failure = 0, 1.0, ""
+        self._sections = _beams_of(scene)
         self._known: list[Array] = []
         self._here = self._built(self._values)
         self._nodes = self._strands()
@@ -159,8 +181,7 @@ class _Search:
 
     def _built(self, values: Array, shapes: Sequence[Equilibrium] = ()) -> list[Equilibrium]:
         """Return the equilibria of the scene with such values, one for each target, near some shapes."""
-        scene = load_content(scene_content(self._scene), self._changes(values))
-        simulator, found = Simulator(scene), []
+        simulator, found = Simulator(self._scene_with(values, self._sections)), []
         for k, level in enumerate(self._levels):
             simulator.reset()
             for channel, value in level.items():
@@ -172,11 +193,11 @@ class _Search:
             found.append(equilibrium_of(simulator))
         return found
 
-    def _changes(self, values: Array) -> dict[str, Any]:
-        found: dict[str, Any] = {} if self._weight == 1.0 else {"gravity": list(self._gravity)}
+    def _scene_with(self, values: Array, sections: dict[str, str]) -> SceneConfig:
+        changes = sections | ({} if self._weight == 1.0 else {"gravity": list(self._gravity)})
         for v, own in zip(self._varied, self._pattern.split(values), strict=True):
-            found |= v.changes(own)
-        return found
+            changes |= v.changes(own)
+        return load_content(scene_content(self._scene), changes)
 
     @property
     def _gravity(self) -> tuple[float, ...]:
@@ -195,23 +216,28 @@ class _Search:
 
     def _strands(self) -> list[slice]:
         """Return the nodes of the strands of the rod; two of them have its curve between them."""
-        name, strands = rod_of(self._scene, self._varied), self._here[0].model.strands
-        rod = next(rod for rod in self._scene.rods if name in rod.copy_names)
-        if not (rod.clamp_start or any(variant.clamp_start for variant in rod.variants)):
+        rod, strands = rod_of(self._scene, self._varied), self._here[0].model.strands
+        name, rod = rod.copies[0].name, rod.copies[0].rod
+        if not rod.clamp_start:
             raise InputError(
                 f"rods.{rod.name}: wanted curves begin where the rod does, which nothing holds: clamp_start"
             )
         found = [slice(s.first_node, s.first_node + s.shown) for s in strands if s.rod == name]
         return found if len({s.stop - s.start for s in found}) == 1 else found[:1]
 
-    def _curve(self, here: Equilibrium) -> Array:
-        """Return the curve of the rod [m], shape (n, 3)."""
-        return np.mean([here.positions[nodes] for nodes in self._nodes], axis=0)
+    def _of_rod(self, of_nodes: Array) -> Array:
+        """Return what the curve of the rod has, of what nodes have."""
+        return np.mean([of_nodes[nodes] for nodes in self._nodes], axis=0)
+
+    def _curve(self, here: Equilibrium | Simulator) -> Array:
+        """Return the curve of the rod from its start, which a body that floats may hold [m], shape (n, 3)."""
+        points = self._of_rod(here.positions)
+        return points - points[0]
 
     def _derivatives(self, here: Equilibrium, parameters: list[Parameter]) -> Array:
         """Return its derivatives, shape (n, 3, n_parameter)."""
-        velocities = here.velocities(parameters)
-        return np.mean([velocities[nodes] for nodes in self._nodes], axis=0)
+        velocities = self._of_rod(here.velocities(parameters))
+        return velocities - velocities[0]
 
     def _slopes(self) -> list[Array]:
         """Return its derivatives by the values at each level, computed once for each equilibrium."""
@@ -221,7 +247,7 @@ class _Search:
         return self._known
 
     def _placed(self, curve: TargetCurve, here: Equilibrium, slopes: Array) -> TargetCurve:
-        """Return a target, moved to where the rod begins."""
+        """Return a target, moved to begin at the origin."""
         made, first = self._curve(here), [nodes.start for nodes in self._nodes]
         start = here.model.start_position
         edge = np.mean([start[k + 1] - start[k] for k in first], axis=0)
@@ -230,7 +256,8 @@ class _Search:
         if angle > STEEPEST:
             raise InputError(
                 f"{curve.source}: begins {math.degrees(angle):.3g}° from the direction in which the rod begins, which "
-                f"is {', '.join(f'{x:.3g}' for x in way)}; allowed are {math.degrees(STEEPEST):g}°: turn the curve"
+                f"is {', '.join(f'{x:.3g}' for x in way)}; allowed are {math.degrees(STEEPEST):g}°: turn the curve "
+                "or reverse it"
             )
         edges = np.diff(made, axis=0)
         lengths = np.linalg.norm(edges, axis=1)
@@ -242,7 +269,8 @@ class _Search:
         if not least / LONGEST <= curve.length <= LONGEST * most:
             raise InputError(
                 f"{curve.source}: is {1e3 * curve.length:.4g} mm long; within these bounds the rod becomes "
-                f"{1e3 * least:.4g} to {1e3 * most:.4g} mm long, and allowed are {LONGEST:g} times more and less"
+                f"{1e3 * least:.4g} to {1e3 * most:.4g} mm long, and allowed are {LONGEST:g} times more "
+                "and less; x, y and z are in m"
             )
         if self._in_plane:
             aside = np.ptp(curve.points @ np.cross(*here.model.rods.axes))
@@ -251,43 +279,57 @@ class _Search:
                     f"{curve.source}: leaves its plane by {1e3 * aside:.4g} mm, in which the rod stays; allowed are "
                     f"{100.0 * ASIDE:g} % of its length: let the rod twist, as fibres at an angle do"
                 )
-        return TargetCurve(curve.points + (made[0] - curve.at(np.zeros(1))[0]), curve.source)
+        return TargetCurve(curve.points - curve.at(np.zeros(1))[0], curve.source)
 
     def _go(self, values: Array) -> None:
         """Go to the equilibria with other values."""
         self._known = []
-        if not self._by_laws or self._here[0].scene.gravity != self._gravity:
+        if not self._by_laws or self._here[0].model.scene.gravity != self._gravity:
             self._here = self._built(values, self._here)
             self._parameters = [self._sought(here) for here in self._here]
         else:
             for here, parameters in zip(self._here, self._parameters, strict=True):
-                gains = here.gains
-                for parameter, value in zip(parameters, values[self._owner].tolist(), strict=True):
-                    gains[parameter.laws] = value
-                here.go_to(gains)
+                here.go_to(parameters, values[self._owner].tolist())
                 self.equilibria += 1
 
     def _departures(self, targets: Sequence[TargetCurve]) -> list[tuple[Array, Array]]:
-        """Return ways from targets to the rod [m], and tangents there."""
+        """Return ways from targets to the rod [m], and tangents there; those of shapes on the way from point to point,
+        since sliding along them the rod would go astray.
+        """
         found = []
         for here, target in zip(self._here, targets, strict=True):
             made = self._curve(here)
             lengths = np.linalg.norm(np.diff(made, axis=0), axis=1)
-            found.append(target.departures(made, np.concatenate([[0.0], np.cumsum(lengths)])))
+            along = np.concatenate([[0.0], np.cumsum(lengths)])
+            if targets is self._targets:
+                found.append(target.departures(made, along))
+            else:
+                away = made - target.at(along * (target.length / along[-1]))
+                found.append((away, np.zeros_like(away)))
         return found
 
     def _rms(self, targets: Sequence[TargetCurve]) -> float:
         ways = [away for away, _ in self._departures(targets)]
         return math.sqrt(np.mean([np.mean((away**2).sum(axis=1)) for away in ways])) / self._size
 
+    def _beyond(self, targets: Sequence[TargetCurve]) -> Array:
+        """Return how far beyond the ends of targets the rod ends, along their last tangents [m]."""
+        tips = [self._curve(here)[-1] for here in self._here]
+        ends = [(target.at(end := np.array([target.length]))[0], target.tangents(end)[0]) for target in targets]
+        return np.array([tangent @ (tip - end) for tip, (end, tangent) in zip(tips, ends, strict=True)])
+
     def _equations(self, targets: Sequence[TargetCurve], slopes: list[Array]) -> tuple[Array, Array]:
-        """Return the Jacobian and the values of distances, over the length of the rod."""
+        """Return the Jacobian and the values of distances, over the length of the rod, and last those of its ends."""
         rows, right = [], []
         for (away, tangents), slope in zip(self._departures(targets), slopes, strict=True):
             across = slope - np.einsum("ia,ib,ibk->iak", tangents, tangents, slope)
-            rows.append(across.reshape(away.size, -1) / self._size)
-            right.append(away.ravel() / self._size)
-        return np.concatenate(rows) / math.sqrt(len(away)), np.concatenate(right) / math.sqrt(len(away))
+            rows.append(across.reshape(away.size, -1) / math.sqrt(len(away)))
+            right.append(away.ravel() / math.sqrt(len(away)))
+        last = [target.tangents(np.array([target.length]))[0] for target in targets]
+        rows.append(ENDS * np.array([tangent @ slope[-1] for tangent, slope in zip(last, slopes, strict=True)]))
+        right.append(ENDS * self._beyond(targets))
+        over = self._size * math.sqrt(len(targets))
+        return np.concatenate(rows) / over, np.concatenate(right) / over
 
     def _angles(self, targets: Sequence[TargetCurve], slopes: list[Array]) -> tuple[Array, Array]:
         """Return the Jacobian and the values of angles of edges in the plane, over those of the targets [rad]."""
@@ -309,7 +351,8 @@ class _Search:
 
     def _left(self, targets: Sequence[TargetCurve]) -> float:
         """Return the root of the sum that steps make smaller."""
-        return math.hypot(self._rms(targets), math.sqrt(self._pattern.roughness(self._values)))
+        ends = ENDS * math.sqrt(np.mean(self._beyond(targets) ** 2)) / self._size
+        return math.hypot(self._rms(targets), ends, math.sqrt(self._pattern.roughness(self._values)))
 
     def _improve(self, targets: Sequence[TargetCurve], steps: int) -> str:
         """Make steps towards targets, and return why they ended."""
@@ -376,19 +419,37 @@ class _Search:
             self._progress(f"{self.equilibria} equilibria: rms distance {100 * rms:.3g} % of the rod")
 
     def result(self) -> DesignResult:
-        """Search, and return what was found."""
+        """Search, and return what was found.
+
+        Which sections rods have may follow from the pattern. Beams come first: they have one shape at rest, from which
+        wide strips find their own that is near. Where strips have none, the scene keeps the sections of the search.
+        """
         termination = self._search()
         for _ in range(MOST_MODELS):
-            scene = load_content(scene_content(self._scene), self._changes(self._values))
-            simulator = Simulator(scene)
-            if not self._by_laws or alike_but_gains(self._here[0].model, simulator.model):
+            simulator = Simulator(self._scene_with(self._values, {}))
+            if alike_but_gains(self._here[0].model, simulator.model):
                 break
-            self._scene, self._known = scene, []  # what its sections are follows from the pattern
-            self._here = self._built(self._values, self._here)
-            self._parameters = [self._sought(here) for here in self._here]
-            self._by_laws = self._are_laws()
-            termination = self._found()
+            before, sections = self._kept(), self._sections
+            self._sections, self._known = _sections_of(simulator.scene, simulator.plan.model), []
+            try:
+                self._here = self._built(self._values, self._here)
+                self._parameters = [self._sought(here) for here in self._here]
+                self._by_laws = self._are_laws()
+                termination = self._search()
+            except SimulationError as error:
+                own = ", ".join(f"{path}: {self._sections[path]}" for path in self._sections)
+                termination += f"; no equilibrium is near with its own sections ({own}): {error}"
+                self._sections = sections
+                self._return_to(before)
+                simulator = self._in_sections_of_search()
+                break
+        else:
+            termination += "; sections change with the pattern"
+            simulator = self._in_sections_of_search()
         return self._report(termination + self._out_of_reach(), simulator)
+
+    def _in_sections_of_search(self):
+        return Simulator(self._scene_with(self._values, self._sections))
 
     def _search(self) -> str:
         """Go to the best pattern, and return why the search ended there.
@@ -440,7 +501,7 @@ class _Search:
             self._in_parts(lambda part: self._step(near(part), self._weight))
         else:
             count = math.ceil(max(_turning(target) for target in self._targets) / TURN)
-            for k in range(1, count):
+            for k in range(1, count + 1):
                 self._improve(near(k / count), 2)
 
     def _in_parts(self, go: Callable[[float], bool]) -> None:
@@ -460,11 +521,9 @@ class _Search:
         """Make a step towards targets under a part of the weight, and return whether it led where equations say."""
         equations, pull = self._angles if self._in_plane else self._equations, np.zeros(1)
         if weight != self._weight:
-            self._here = self._built(self._values, self._here)  # whose scenes have the present gains
             sizes = {f"gravity.{k}": size for k, size in enumerate(self._scene.gravity) if size}
             slopes = [self._derivatives(here, self._sought(here, list(sizes))) for here in self._here]
             pull = equations(targets, slopes)[0] @ list(sizes.values()) * (weight - self._weight)
-            self._parameters = [self._sought(here) for here in self._here]
             self._weight, self._known = weight, []
         rows, right = equations(targets, self._slopes())
         values = self._pattern.solved(rows, right + pull, self._values, 0.0)
@@ -483,17 +542,20 @@ class _Search:
         moved = np.max([np.abs(slopes).max(axis=(0, 1)) for slopes in self._slopes()], axis=0)
         acts = self._pattern.split(moved * (self._pattern.high - self._pattern.low) >= 1e-12 * self._size)
         if idle := [v.path for v, own in zip(self._varied, acts, strict=True) if not own.any()]:
-            raise InputError(f"vary {', '.join(idle)}: acts on nothing at these stimuli; leave it out")
+            of = rod_of(self._scene, self._varied).name
+            raise InputError(f"vary {', '.join(idle)}: acts on nothing of rods.{of} at these stimuli; leave it out")
 
     def _out_of_reach(self) -> str:
         """Return along which direction nothing moves the rod though it is away from a target, as a text."""
-        for (away, _), slopes in zip(self._departures(self._targets), self._slopes(), strict=True):
+        for (away, _), slopes, level in zip(self._departures(self._targets), self._slopes(), self._levels, strict=True):
             moved = slopes.swapaxes(1, 2).reshape(-1, 3)
             _, sizes, ways = np.linalg.svd(moved, full_matrices=False)
-            missed = float(np.abs(away @ ways[2]).max())
-            if sizes[2] < FIXED * sizes[0] and missed > CLOSE * self._size:
-                way = ", ".join(f"{abs(x):.3g}" for x in ways[2])
-                return f"; unreachable: {1e3 * missed:.3g} mm along ({way}), where nothing that varies moves the rod"
+            alone = away @ ways[2] if sizes[0] > 0.0 else np.linalg.norm(away, axis=1)
+            missed = float(np.abs(alone).max())
+            if sizes[2] <= FIXED * sizes[0] and missed > CLOSE * self._size:
+                way = f"along ({', '.join(f'{abs(x):.3g}' for x in ways[2].round(3))})"
+                where = way if sizes[0] > 0.0 else f"at {stimuli_text(level)}"
+                return f"; unreachable: {1e3 * missed:.3g} mm {where}, where nothing that varies moves the rod"
         return ""
 
     def _report(self, termination: str, simulator: Simulator) -> DesignResult:
@@ -501,34 +563,77 @@ class _Search:
         for target, level, here, (away, _) in zip(
             self._targets, self._levels, self._here, self._departures(self._targets), strict=True
         ):
-            made = self._curve(here)
-            take_shape(simulator, here)
-            stable = simulator.solve_static().stable
+            made = self._of_rod(here.positions)
+            target = TargetCurve(target.points + made[0], target.source)
             length = float(np.linalg.norm(np.diff(made, axis=0), axis=1).sum())
-            shapes.append(Shape(target, level, made, np.linalg.norm(away, axis=1), length, stable))
-        final = equilibrium_of(simulator)
+            stable, reached = self._is_stable(simulator, here), self._is_reached(simulator, here, level)
+            shapes.append(Shape(target, level, made, np.linalg.norm(away, axis=1), length, stable, reached))
         part = self._pattern.parts(self._values)[[not v.palette for v in self._varied for _ in v.start]]
         at_bounds = int(np.sum((part <= AT_BOUND) | (part >= 1.0 - AT_BOUND)))
         values = self._pattern.split(self._values)
         return DesignResult(
-            scene, self._varied, values, shapes, at_bounds, self._sensitivity(final), self.equilibria, termination
+            scene, self._varied, values, shapes, at_bounds, self._sensitivity(), self.equilibria, termination
         )
 
-    def _sensitivity(self, here: Equilibrium) -> dict[str, float]:
-        """Return the displacements by errors of 1 % in each pattern, and in the thickness of each layer [m]."""
+    def _is_stable(self, simulator: Simulator, here: Equilibrium) -> bool:
+        """Return whether a simulator of the scene stays at an equilibrium, and all small disturbances decay."""
+        take_shape(simulator, here)
+        with contextlib.suppress(SimulationError):
+            return simulator.solve_static().stable and self._is_at(simulator, here)
+        return False
+
+    def _is_reached(self, simulator: Simulator, here: Equilibrium, level: dict[str, float]) -> bool:
+        """Return whether the rod comes to an equilibrium from the start of the scene, at once or as stimuli rise."""
+        for count in (1, RISES):
+            simulator.reset()
+            begin = simulator.stimulus
+            with contextlib.suppress(SimulationError):
+                for k in range(1, count + 1):
+                    for channel, value in level.items():
+                        simulator.set_stimulus(channel, begin[channel] + k / count * (value - begin[channel]))
+                    simulator.solve_static()
+                if self._is_at(simulator, here):
+                    return True
+        return False
+
+    def _is_at(self, simulator: Simulator, here: Equilibrium) -> bool:
+        return bool(np.abs(self._curve(simulator) - self._curve(here)).max() <= CLOSE * self._size)
+
+    def _sensitivity(self) -> dict[str, float]:
+        """Return the largest displacements by errors of 1 % in each pattern, and in the thickness of each layer [m]."""
         found: dict[str, float] = {}
-        slopes, begin = self._slopes()[-1], 0
+
+        def note(path: str, moved: list[Array]) -> None:
+            found[path] = 0.01 * max(float(np.linalg.norm(of, axis=1).max()) for of in moved)
+
+        begin = 0
         for v, own in zip(self._varied, self._pattern.split(self._values), strict=True):
-            moved = slopes[..., begin : begin + len(own)] @ own
-            found[v.path] = 0.01 * float(np.linalg.norm(moved, axis=1).max())
+            note(v.path, [slopes[..., begin : begin + len(own)] @ own for slopes in self._slopes()])
             begin += len(own)
-        rod = next(rod for rod in self._scene.rods if rod_of(self._scene, self._varied) in rod.copy_names)
+        rod = rod_of(self._scene, self._varied)
         for layer in rod.layers:
             path = f"rods.{rod.name}.layers.{layer.name}.thickness"
             if isinstance(layer.thickness, float) and rod.radius is None and path not in found:
-                moved = self._derivatives(here, here.parameters([path])[path])[..., 0] * layer.thickness
-                found[path] = 0.01 * float(np.linalg.norm(moved, axis=1).max())
+                slopes = [self._derivatives(here, self._sought(here, [path]))[..., 0] for here in self._here]
+                note(path, [slope * layer.thickness for slope in slopes])
         return found
+
+
+def _sections_of(scene: SceneConfig, model: str) -> dict[str, str]:
+    """Return the sections of rods that may be beams or strips, as changes of a scene that give it these alone."""
+    found = {
+        f"rods.{rod.name}.section": section_of(scene, rod, model)
+        for rod in scene.rods
+        if rod.section != "beam" and not rod.feels_across and rod.radius is None
+    }
+    return found | {"solver.model": model} if found else {}
+
+
+def _beams_of(scene: SceneConfig) -> dict[str, str]:
+    """Return changes of a scene that make beams of its strips, where that does not change the model."""
+    model = simplest_model(scene)[0] if scene.solver.model == "auto" else scene.solver.model
+    found = _sections_of(scene, model) if model == "laminate" else {}
+    return {path: "beam" if path.endswith(".section") else value for path, value in found.items()}
 
 
 def _turning(curve: TargetCurve) -> float:
