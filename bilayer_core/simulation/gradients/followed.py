@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from bilayer_core.engine.steps_again import (
+from bilayer_core.engine.gradient_differences import (
     Differences,
     differentiate_followed,
     differentiate_friction,

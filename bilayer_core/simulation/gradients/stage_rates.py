@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bilayer_core.engine.steps_again import StrainDifferences
+from bilayer_core.engine.gradient_differences import StrainDifferences
 from bilayer_core.forces.body_drag import body_flow_of
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration

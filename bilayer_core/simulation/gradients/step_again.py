@@ -13,21 +13,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bilayer_core.engine.evaluator import Evaluator
+from bilayer_core.engine.gradient_differences import StrainDifferences, differentiate_by_laws, differentiate_by_strains
+from bilayer_core.engine.linear.krylov_solution import Lack, solve_with_lack
 from bilayer_core.engine.linear.newton_matrix import solve
 from bilayer_core.engine.step_ends import end_stage
-from bilayer_core.engine.steps_again import (
-    Lack,
-    Reached,
-    StrainDifferences,
-    begin_stage,
-    begin_step,
-    differentiate_by_laws,
-    differentiate_by_strains,
-    expect_end,
-    follow,
-    go_to,
-    solve_with_lack,
-)
+from bilayer_core.engine.steps_again import Reached, begin_stage, begin_step, expect_end, follow, go_to
 from bilayer_core.errors import SimulationError
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.status import READY
