@@ -11,19 +11,13 @@ from bilayer_core.engine.potential import (
 )
 from bilayer_core.engine.steps_again import follow, hold_fixed
 from bilayer_core.forces.added_mass import fluid_momentum
-from bilayer_core.forces.contact_on_bodies import condense_contact
 from bilayer_core.forces.elements import start_elements
-from bilayer_core.forces.friction_change import FrozenChange, add_changed_friction, add_frozen, begin_change
 from bilayer_core.forces.rod_contact import find_rod_contacts
-from bilayer_core.forces.surface_friction import freeze_surface_contacts
 from bilayer_core.jit import kernel, piece, record
 from bilayer_core.jit.record import Flags, Indices, Matrix
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Stage, Work
-
-DIRECTOR = 1024.0
-"""Change of a director over that of a position [1/m]."""
 
 
 @record
@@ -38,11 +32,8 @@ class Differences:
         Matrix  # for each colour a row for each way of nodes, a row for each colour of edges, then those of bodies
     )
     by_origin: Matrix
-    by_pose: Matrix  # of free bodies at the origin: a row for each way of its place, R̃ and ω̃, shape (9 n_free, size)
-    by_director: Matrix  # of raised edges at the origin: for each colour of edges a row for each component
     pressing: Flags  # forces that are evaluated before others take anything from a configuration, shape (n_force,)
-    following: Flags  # these others, but for friction on surfaces
-    friction: FrozenChange  # on surfaces, absent without
+    following: Flags  # these others
 
 
 @record
@@ -141,112 +132,8 @@ def differentiate_followed(p, differences, at, trial, stage, h):
             hold_fixed(p, at, stage)
             _add_forces_on_nodes(p, at, stage, side / (2.0 * h), by_origin, row)
             _move_origin(p, stage, -1.0)
-    for row in range(differences.by_director.shape[0]):
-        for side in range(-1, 2, 2):
-            _move_directors(p, differences, row, side * h * DIRECTOR, stage)
-            _add_forces_on_nodes(p, at, stage, side / (2.0 * h * DIRECTOR), differences.by_director, row)
-            _move_directors(p, differences, row, -side * h * DIRECTOR, stage)
     hold_fixed(p, at, stage)
     return READY
-
-
-@kernel
-def _add_friction_change(p, differences, at, stage, out, row):
-    """Add to a row what the change that is noted makes of friction on surfaces."""
-    sums = p.sums
-    sums.gradients[:] = 0.0
-    add_changed_friction(p.sliding, p, at, stage, differences.friction)
-    condense_contact(p.has_contact, p.bodies, sums)
-    expand_gradient(p.bonds, p.strands, sums)
-    _add_row(p, 1.0, out, row)
-
-
-@kernel
-def _any_spread(sliding):
-    if sliding.spreads:
-        for s in range(sliding.spread.shape[0]):
-            for i in range(sliding.spread.shape[1]):
-                if sliding.spread[s, i]:
-                    return True
-    return False
-
-
-@piece(int, Problem, Differences, Configuration, Configuration, Stage, float)
-def differentiate_friction(p, differences, at, trial, stage, h):
-    """Add what `differentiate_followed` leaves out: friction on surfaces, and by poses of free bodies at the origin."""
-    by_place, by_origin, by_pose, sliding = (
-        differences.by_place,
-        differences.by_origin,
-        differences.by_pose,
-        p.sliding,
-    )
-    change = differences.friction
-    freeze_surface_contacts(sliding, p, at, stage)
-    for row in range(by_place.shape[0]):
-        begin_change(sliding, change)
-        for side in range(-1, 2, 2):
-            _write_step(p, differences, row, side * h)
-            move(p, at, 1.0, stage, trial)
-            freeze_surface_contacts(sliding, p, trial, stage)
-            add_frozen(sliding, p, at, stage, side / (2.0 * h), change)
-        freeze_surface_contacts(sliding, p, at, stage)
-        _add_friction_change(p, differences, at, stage, by_place, row)
-    spread = _any_spread(sliding)  # else contacts freeze the same wherever the origin is
-    for row in range(by_origin.shape[0] + by_pose.shape[0]):
-        of_body = row - by_origin.shape[0]
-        begin_change(sliding, change)
-        if of_body < 0:
-            _write_step(p, differences, row, h)
-        for side in range(-1, 2, 2):
-            if of_body < 0:
-                _move_origin(p, stage, side)
-            else:
-                _move_pose(p, stage, of_body // 9, of_body % 9, side * h)
-            if spread or of_body >= 0:
-                freeze_surface_contacts(sliding, p, at, stage)
-            add_frozen(sliding, p, at, stage, side / (2.0 * h), change)
-            if of_body < 0:
-                _move_origin(p, stage, -side)
-            else:
-                _move_pose(p, stage, of_body // 9, of_body % 9, -side * h)
-        if spread or of_body >= 0:
-            freeze_surface_contacts(sliding, p, at, stage)
-        if of_body < 0:
-            _add_friction_change(p, differences, at, stage, by_origin, row)
-        else:
-            _add_friction_change(p, differences, at, stage, by_pose, of_body)
-    return READY
-
-
-@kernel
-def _move_pose(p, stage, f, way, h):
-    """Move free body f at the origin of a stage, (1 − length [ω̃]×) R̃, by a component of its position, by a turn of R̃,
-    or by ω̃, of which h is that times the length.
-    """
-    b, c = p.bodies.body_of_free[f], way % 3
-    if way < 3:
-        stage.origin_pose_position[b, c] += h
-        return
-    length, spin, ahead, out = stage.length, stage.body_spin, stage.predicted_body_rotation, stage.origin_rotation
-    d, e = (c + 1) % 3, (c + 2) % 3
-    for j in range(3):
-        u, v = -h * ahead[f, e, j], h * ahead[f, d, j]  # h e_c × R̃ has components d and e
-        if way >= 6:
-            out[b, d, j] -= u
-            out[b, e, j] -= v
-            continue
-        out[b, d, j] += u - length * spin[f, c] * -v
-        out[b, e, j] += v - length * spin[f, c] * u
-        out[b, c, j] -= length * (spin[f, d] * v - spin[f, e] * u)
-
-
-@kernel
-def _move_directors(p, differences, row, h, stage):
-    """Move a component of those of a colour at the origin of a stage."""
-    raised = p.raised
-    for r in range(raised.edge.shape[0]):
-        if differences.edge_colour[raised.edge[r]] == row // 3:
-            stage.origin_strain[raised.first + 3 * raised.slot[r] + row % 3] += h
 
 
 @piece(int, Problem, Differences, Configuration, Configuration, Stage, float)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
+from bilayer_core.engine.linear.lacking_matrix import LackingMatrix, multiply
 from bilayer_core.engine.linear.newton_matrix import solve
 from bilayer_core.jit import kernel, piece, record
-from bilayer_core.jit.record import Indices, Matrix, Vector
+from bilayer_core.jit.record import Matrix, Vector
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration
@@ -14,19 +15,17 @@ from bilayer_core.model.records.step import Configuration
 
 @record
 class Lack:
-    """Entries of a matrix that a Hessian lacks, by motions of all nodes and forces on them, those among them that
-    bodies hold, and the space of Krylov in which both are solved.
+    """What a Hessian lacks, by motions of all nodes and forces on them, those among them that bodies hold, and the
+    space of Krylov in which both are solved.
     """
 
-    count: Indices  # of entries, shape (1,)
-    row: Indices
-    column: Indices
-    value: Vector
+    matrix: LackingMatrix
     basis: Matrix  # shape (n_round + 1, size)
     projected: Matrix  # H, shape (n_round, n_round + 1), a row for each vector
     turns: Matrix  # cosines and sines, shape (n_round, 2)
     rest: Vector  # shape (n_round + 1,)
     spread: Vector  # motions, with those of nodes that bodies hold, shape (size,)
+    force: Vector  # likewise
 
 
 @kernel
@@ -77,10 +76,11 @@ def _dot(a, b):
     return total
 
 
-@piece(int, Problem, Configuration, Lack, float)
-def solve_with_lack(p, at, lack, enough):
-    """Write the inverse of the factorised Hessian of a configuration and of what it lacks together, times the present
-    gradient, to `System.step`, by GMRES with the Hessian before it; what is left over is `enough` of the whole at most.
+@piece(int, Problem, Configuration, Lack, float, bool)
+def solve_with_lack(p, at, lack, enough, back):
+    """Write the inverse of the factorised Hessian of a configuration and of what it lacks together, `back` that of the
+    transpose, times the present gradient, to `System.step`, by GMRES with the Hessian before it; what is left over is
+    `enough` of the whole at most.
     """
     basis, projected, turns, rest = lack.basis, lack.projected, lack.turns, lack.rest
     step, body_step, size, rods = p.system.step, p.system.body_step, basis.shape[1], p.sums.gradient.shape[0]
@@ -99,14 +99,12 @@ def solve_with_lack(p, at, lack, enough):
         for j in range(size):
             spread[j] = now[j]
         _spread(p, at, spread)
-        p.sums.gradient[:] = 0.0
-        p.sums.body[:] = 0.0
-        for m in range(lack.count[0]):
-            j, force = lack.row[m], lack.value[m] * spread[lack.column[m]]
-            if j < rods:
-                p.sums.gradient[j] += force
-            else:
-                p.sums.body[(j - rods) // 6, (j - rods) % 6] += force
+        lack.force[:] = 0.0
+        multiply(lack.matrix, spread, back, lack.force)
+        for j in range(rods):
+            p.sums.gradient[j] = lack.force[j]
+        for j in range(rods, size):
+            p.sums.body[(j - rods) // 6, (j - rods) % 6] = lack.force[j]
         _gather(p, at)
         _solve(p, after)
         for j in range(size):

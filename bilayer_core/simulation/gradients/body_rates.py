@@ -36,19 +36,6 @@ def _axial(a: Array) -> Array:
     return np.array([a[2, 1] - a[1, 2], a[0, 2] - a[2, 0], a[1, 0] - a[0, 1]])
 
 
-def drag_by_origin(flow: BodyFlow, again: StepAgain, at: Configuration) -> Entries:
-    """Return how the drag of bodies depends on where they were at the origin of a stage, shape (size, size)."""
-    stage, size, blocks, rows = again.stage, again.size, [], []
-    for f, coefficient in zip(flow.free, flow.coefficient, strict=True):
-        v = (at.body_position[f] - stage.origin_body_position[f]) / stage.length - flow.velocity
-        speed = math.sqrt(float(v @ v))
-        along = np.outer(v, v) / speed if speed > 0.0 else np.zeros((3, 3))
-        blocks.append(-coefficient / stage.length * (speed * np.eye(3) + along))
-        rows.append(again.of_bodies[f, :3])
-    row = np.repeat(np.array(rows)[:, :, None], 3, axis=2)
-    return Entries(row.ravel(), row.swapaxes(1, 2).ravel(), np.array(blocks).ravel(), (size, size))
-
-
 class BodyRates:
     """Maps of free bodies in a stage.
 
@@ -116,21 +103,6 @@ class BodyRates:
 
     def _turns(self, of: Array) -> Array:
         return of[self.unknown[:, 3:]]
-
-    def add_slides(self, again: StepAgain, at: Configuration, slides: Array | None) -> None:
-        """Take how friction, by forces on all nodes, depends on turns of R̃ and on ω̃, shape (n_free, 6, size), and add
-        what moments do (`forces.loads`).
-        """
-        moments, size = again.problem.moments, again.size
-        if slides is not None:
-            self.slides = self.gather(slides.reshape(-1, size).T).T.reshape(-1, 6, size)
-        elif moments.exists:
-            self.slides = np.zeros((len(self.unknown), 6, size))
-        for f, moment in zip(moments.body, moments.present, strict=True):
-            turn = again.stage.predicted_body_rotation[f] @ at.body_rotation[f].T
-            for c in range(3):
-                change = 0.5 * cross_matrix(moment) @ cross_matrix(np.eye(3)[c]) @ turn
-                self.slides[f, c, self.unknown[f, 3:]] -= _axial(change)
 
     # places of what bodies hold
 
@@ -204,8 +176,6 @@ class BodyRates:
     def push(self, ahead: Array, right: Array) -> None:
         """Add what turns to where inertia takes bodies, and ω̃, make of moments of inertia, of friction and of loads."""
         right[self.unknown[:, 3:]] -= self._of["k_before"] @ ahead[:, :3] / (self.length * self.momentum_length)
-        if self.slides is not None:
-            right += np.einsum("fcj,fcn->jn", self.slides, ahead)
 
     def end(self, end: Array, origin_speed: Array, ahead: Array, end_speed: Array) -> None:
         """Write angular momenta at the end."""
@@ -230,10 +200,7 @@ class BodyRates:
 
     def push_back(self, right: Array) -> Array:
         """Return derivatives by turns to where inertia takes bodies, and by ω̃."""
-        found = self._by_ahead(self._turns(right) / (self.length * self.momentum_length))
-        if self.slides is not None:
-            found += np.einsum("fcj,jn->fcn", self.slides, right)
-        return found
+        return self._by_ahead(self._turns(right) / (self.length * self.momentum_length))
 
     def guess_back(self, guess: Array, origin: Array, speed: Array, ahead: Array) -> None:
         """Take derivatives by the first guess of what is held."""

@@ -2,7 +2,8 @@
 
 In Newton's method they hold fixed what they took from the configuration, and the Hessian knows nothing of that. A stage
 ends where what they took is that of the end. So its matrix lacks ∂g/∂z ∂z/∂q, with z what they take, and its gradient
-depends on the origin of the stage by velocities. Both are differences of the gradient of these forces: unknowns that
+depends on the origin of the stage by velocities. Drag and friction on surfaces are differentiated element by element
+(`engine.stage_maps`, `engine.friction_differences`). Of other forces both are differences of the gradient: unknowns that
 no row sees together change at once, and those of rods that touch one by one.
 """
 
@@ -12,32 +13,32 @@ import math
 
 import numpy as np
 
-from bilayer_core.engine.gradient_differences import (
-    Differences,
-    differentiate_followed,
-    differentiate_friction,
-    differentiate_momentum,
-)
+from bilayer_core.engine.friction_differences import differentiate_friction
+from bilayer_core.engine.gradient_differences import Differences, differentiate_followed, differentiate_momentum
+from bilayer_core.engine.linear.lacking_matrix import LackingMatrix
+from bilayer_core.engine.stage_maps import clear_maps, differentiate_drag, differentiate_other_drag
+from bilayer_core.forces.body_drag import body_flow_of
 from bilayer_core.forces.friction_change import FrozenChange
+from bilayer_core.forces.turning_drag import turning_flow_of
 from bilayer_core.model.force_slots import NAMES
 from bilayer_core.model.model import Model
-from bilayer_core.model.records.contacts import Sliding
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.simulation.gradients.entries import Entries
-from bilayer_core.simulation.gradients.step_again import Lacking, StepAgain
+from bilayer_core.simulation.gradients.step_again import StepAgain, cross_matrix
 
 Array = np.ndarray
-FOLLOWING = ("drag", "turning drag", "added mass", "followers", "moments", "friction", "rod friction")
+BY_DIFFERENCES = ("added mass", "followers", "moments", "rod friction")
 PRESSING = ("barrier", "rod barrier")
 """On which friction depends."""
 REACH = 2
-"""Nodes along a strand over which such a force at one depends on another: 1 for drag at the curve."""
+"""Nodes along a strand over which such a force at one depends on another."""
 FINE = 1e-5
 """Of the slip within which friction rests, of the smallest gap, and of a tenth of an edge: steps of differences."""
 SLIP = 1e-3
 """Likewise, where differences see no kink of friction."""
-ORIGIN = ("origin_position", "origin_angle", "origin_pose_position", "origin_rotation")
+ORIGIN = ("origin_position", "origin_angle")
 """Parts of a stage that are moved."""
+_MOMENT = np.array([[2, 1], [0, 2], [1, 0]])
 
 
 def _rounded(h: float) -> float:
@@ -45,40 +46,48 @@ def _rounded(h: float) -> float:
     return 2.0 ** math.floor(math.log2(h))
 
 
-def _room_for(sliding: Sliding) -> FrozenChange:
-    """Return a change of contacts, with room for all there may be."""
-    shapes = {"part": (2,), "rate": (3, 8)} | {name: (3,) for name in ("normal", "axis", "slip", "arm", "lever")}
-    most = len(sliding.load)
+def _room_for(places: int) -> FrozenChange:
+    """Return a change of a contact with some places."""
+    shapes = {"rate": (3, 8)} | {name: (3,) for name in ("normal", "axis", "slip", "arm", "lever")}
     return FrozenChange(
-        count=np.zeros(1, dtype=np.int64),
-        **{name: np.zeros(most, dtype=np.int64) for name in ("first", "surface", "found")},
-        **{name: np.zeros((most, *shapes.get(name, ()))) for name in ("load", "smooth", *shapes)},
+        **{name: np.zeros((places, *shapes.get(name, ()))) for name in ("load", "smooth", *shapes)},
     )
+
+
+def append(matrix: LackingMatrix, entries: Entries) -> None:
+    """Add entries beside the band of a matrix, as far as there is room."""
+    first, last = int(matrix.count[0]), int(matrix.count[0]) + len(entries.row)
+    if last <= len(matrix.row):
+        for name in ("row", "column", "value"):
+            getattr(matrix, name)[first:last] = getattr(entries, name)
+    matrix.count[0] = last
 
 
 class Followed:
     """Derivatives of the forces of a model that follow the configuration."""
 
     def __init__(self, model: Model, again: StepAgain):
-        moments = again.problem.moments
+        problem, moments = again.problem, again.problem.moments
         turning = moments.exists and moments.dead < len(moments.body)
-        self._forces = [name for name in FOLLOWING if name in model.forces and (turning or name != "moments")]
-        self._otherwise = not set(self._forces) <= {"friction", "rod friction"}
+        self._ways, self._change = np.ascontiguousarray(problem.strands.axes), FrozenChange.absent()
+        self._flows = turning_flow_of(model), body_flow_of(model)
+        self._drag = problem.flow.exists and "drag" in model.forces
+        self._forces = [name for name in BY_DIFFERENCES if name in model.forces and (turning or name != "moments")]
+        self._otherwise = not set(self._forces) <= {"rod friction"}
+        strands, nodes = problem.strands, len(again.of_nodes)
+        self._shortest = float(strands.rest_length.min())
+        self._turns = problem.space.exists
         if not self._forces:
             return
         pressing = [name for name in PRESSING if name in model.forces]
         self._pressing, self._following = (
-            np.array([name in chosen for name in NAMES]) for chosen in (pressing, set(self._forces) - {"friction"})
+            np.array([name in chosen for name in NAMES]) for chosen in (pressing, self._forces)
         )
-        near_alone = set(self._forces) <= {"drag", "turning drag"} and not len(again.problem.raised.edge)
-        self._reach = 1 if near_alone else REACH
+        self._reach = REACH
         self._count = 2 * self._reach + 1
-        strands, nodes = again.problem.strands, len(again.of_nodes)
-        self._first, self._ways = strands.edge_node[: len(again.of_edges)], np.asarray(strands.axes)
-        self._turns = again.problem.space.exists
+        self._first = strands.edge_node[: len(again.of_edges)]
         self._colours, self._edge_colours = np.arange(nodes) % self._count, self._first % self._count
         self._shape, self._plain = (again.size, again.size), None
-        self._shortest = float(strands.rest_length.min())
         strand = np.zeros(nodes, dtype=int)
         strand[1:] = np.cumsum(~np.isin(np.arange(nodes - 1), self._first))
         station = [(again.of_nodes[i], again.of_edges[self._first == i]) for i in range(nodes)]
@@ -92,90 +101,79 @@ class Followed:
                 entries += [(3 * colour + c, row, again.of_nodes[i, c]) for row in seen]
             for unknown in station[i][1] if self._turns else ():
                 entries += [(3 * self._count + colour, row, unknown) for row in seen]
-        raised, of_directors = again.problem.raised, [(0, 0, 0)][:0]
-        self._raised = len(raised.edge) > 0 and not {"drag", "added mass"}.isdisjoint(model.forces)
-        for edge, slot in zip(raised.edge, raised.slot, strict=True) if self._raised else ():
-            i = self._first[edge]
-            near = [
-                j for j in range(max(i - self._reach, 0), min(i + self._reach + 2, nodes)) if strand[j] == strand[i]
-            ]
-            for row in np.concatenate([part for j in near for part in station[j]]):
-                of_directors += [(3 * (i % self._count) + c, row, raised.first + 3 * slot + c) for c in range(3)]
-        self._of_directors = [of.copy() for of in np.array(of_directors, dtype=np.int64).reshape(-1, 3).T]
         self._from, self._row, self._column = (of.copy() for of in np.array(entries, dtype=np.int64).T)
 
-    def matrices(self, again: StepAgain, n: int) -> Lacking:
-        """Return ∂g/∂z ∂z/∂q where stage n ended, and ∂g by the origin of the stage, shapes (size, size): forces on all
-        nodes by motions of those that bodies do not hold.
-        """
-        problem, stage, at = again.problem, again.stage, again.places[n + 1]
-        rubbing = problem.rod_contact.exists and problem.rod_contact.sliding.count[0] > 0
+    def write(self, again: StepAgain, n: int) -> None:
+        """Write ∂g/∂z ∂z/∂q where stage n ended, and ∂g by the origin of the stage: forces on all nodes."""
+        while True:
+            clear_maps(again.maps)
+            again.lacks = self._write(again, n)
+            if not again.overfull:
+                return
+
+    def _write(self, again: StepAgain, n: int) -> bool:
+        """Write them as far as there is room; return whether there is something that the Hessian lacks."""
+        problem, stage, at, maps = again.problem, again.stage, again.places[n + 1], again.maps
         sliding = problem.sliding.exists and problem.sliding.count[0] > 0
-        if not (rubbing or sliding or self._otherwise):
-            return None, None, None, None
-        h, alone, friction = 0.1 * FINE * self._shortest, np.zeros(0, dtype=np.int64), FrozenChange.absent()
+        rubbing = problem.rod_contact.exists and problem.rod_contact.sliding.count[0] > 0
+        if self._drag:
+            differentiate_drag(problem, problem.flow, maps, at, stage)
+        if any(flow.exists for flow in self._flows):
+            differentiate_other_drag(problem, *self._flows, maps, at, stage)
+        if problem.moments.exists:
+            self._add_moments(again, at)
+        if sliding:
+            if len(self._change.load) < len(problem.sliding.load):
+                self._change = _room_for(len(problem.sliding.load))
+            h = min(0.1 * FINE * self._shortest, SLIP * problem.sliding.threshold * stage.length, FINE * again.gap)
+            matrices = self._change, maps.lacking, maps.by_origin, maps.slides
+            differentiate_friction(problem, at, again.spare, stage, _rounded(h), *matrices)
+        if rubbing or self._otherwise:
+            by_place, by_origin = self._by_differences(again, at, rubbing)
+            append(maps.lacking, by_place)
+            append(maps.by_origin, by_origin)
+        return self._drag or sliding or rubbing or self._otherwise
+
+    @staticmethod
+    def _add_moments(again: StepAgain, at: Configuration) -> None:
+        """Add what moments on bodies are by turns of R̃ (`forces.loads`)."""
+        moments, rows = again.problem.moments, again.of_bodies
+        for f, moment in zip(moments.body, moments.present, strict=True):
+            turn = again.stage.predicted_body_rotation[f] @ at.body_rotation[f].T
+            for c in range(3):
+                change = 0.5 * cross_matrix(moment) @ cross_matrix(np.eye(3)[c]) @ turn
+                value = (change.T - change)[_MOMENT[:, 0], _MOMENT[:, 1]]
+                shape = again.size, 6 * len(rows)
+                append(again.maps.slides, Entries(rows[f, 3:], np.full(3, 6 * f + c), value, shape))
+
+    def _by_differences(self, again: StepAgain, at: Configuration, rubbing: bool) -> tuple[Entries, Entries]:
+        """Return both for forces without elements of their own, by differences."""
+        problem, stage = again.problem, again.stage
+        h, alone = 0.1 * FINE * self._shortest, np.zeros(0, dtype=np.int64)
         if rubbing:
             h = min(h, FINE * problem.rod_contact.threshold * stage.length, FINE * again.gap)
             alone = self._near(problem.rod_contact.sliding.node[: problem.rod_contact.sliding.count[0]].ravel())
-        if sliding and again.of_bodies.size:
-            alone = np.union1d(self._near(self._on_free(again)), alone)
-        if problem.sliding.exists and (len(alone) or self._plain is None):
-            friction = _room_for(problem.sliding)
         colour, edge_colour = self._colours.copy(), self._edge_colours.copy()
         colour[alone] = self._count + np.arange(len(alone))
         edges = np.flatnonzero(np.isin(self._first, alone))
         edge_colour[edges] = self._count + np.arange(len(edges))
         if len(alone):
-            found = self._differences(again, colour, edge_colour, friction)
+            found = self._differences(again, colour, edge_colour)
         else:
-            found = self._plain = self._plain or self._differences(again, colour, edge_colour, friction)
-        for part in (found.by_place, found.by_origin, found.by_pose, found.by_director):
-            part[:] = 0.0
+            found = self._plain = self._plain or self._differences(again, colour, edge_colour)
         colours = self._count + len(alone)
         kept = [getattr(stage, name) for name in ORIGIN]
         before = [part.copy() for part in kept]
-        if rubbing or self._otherwise:
-            differentiate_followed(problem, found, at, again.spare, stage, _rounded(h))
-        if sliding:
-            h = min(h, SLIP * problem.sliding.threshold * stage.length, FINE * again.gap)
-            differentiate_friction(problem, found, at, again.spare, stage, _rounded(h))
+        differentiate_followed(problem, found, at, again.spare, stage, _rounded(h))
         for part, values in zip(kept, before, strict=True):
             part[...] = values
         apart = again.of_nodes[alone].ravel(), again.of_edges[edges]
-        bodies, rods = again.of_bodies.ravel(), len(found.by_origin)
-        by_place = self._entries(found.by_place[:rods], colours, apart).beside(found.by_place[rods:], bodies)
-        by_pose = found.by_pose.reshape(-1, 9, again.size)
-        by_pose[:, 6:] *= stage.length
-        by_origin = self._entries(found.by_origin, colours, apart)
-        return (
-            by_place,
-            by_origin.beside(by_pose[:, :3].reshape(-1, again.size), again.of_bodies[:, :3].ravel()),
-            self._by_director(again, found.by_director, edges),
-            by_pose[:, 3:],
-        )
+        rods = len(found.by_origin)
+        by_place = self._entries(found.by_place[:rods], colours, apart)
+        by_place = by_place.beside(found.by_place[rods:], again.of_bodies.ravel())
+        return by_place, self._entries(found.by_origin, colours, apart)
 
-    def _by_director(self, again: StepAgain, rows: Array, edges: Array) -> Entries | None:
-        """Return differences by directors of raised edges as a matrix; some edges changed apart from others."""
-        if not len(rows):
-            return None
-        raised, size = again.problem.raised, again.size
-        place, row, column = self._of_directors
-        alone = np.flatnonzero(np.isin(raised.edge, edges))
-        value = rows[place, row]
-        of_alone = (raised.first + 3 * raised.slot[alone, None] + np.arange(3)).ravel()
-        value[np.isin(column, of_alone)] = 0.0
-        own = 3 * (self._count + np.searchsorted(edges, raised.edge[alone]))[:, None] + np.arange(3)
-        found = Entries(row, column, value, (size, again.stage.origin_strain.size))
-        return found.beside(rows[own.ravel()], of_alone)
-
-    def _on_free(self, again: StepAgain) -> Array:
-        """Return nodes of rods that rub on free bodies."""
-        surfaces, sliding, free = again.problem.surfaces, again.problem.sliding, again.problem.bodies.free_index
-        which = np.arange(sliding.count[0])
-        of_rods = surfaces.contact_point_body[sliding.first[which]] < 0
-        return sliding.node[which[of_rods & (free[surfaces.body[sliding.surface[which]]] >= 0)]]
-
-    def _differences(self, again: StepAgain, colour: Array, edge_colour: Array, friction: FrozenChange) -> Differences:
+    def _differences(self, again: StepAgain, colour: Array, edge_colour: Array) -> Differences:
         """Return arrays for differences by unknowns of these colours."""
         colours = max(self._count, int(colour.max()) + 1)
         rows = colours * len(self._ways) + (max(self._count, int(edge_colour.max()) + 1) if self._turns else 0)
@@ -187,11 +185,8 @@ class Followed:
             edge_colour=edge_colour,
             by_place=np.zeros((rows + bodies, again.size)),
             by_origin=np.zeros((rows, again.size)),
-            by_pose=np.zeros((9 * len(again.of_bodies), again.size)),
-            by_director=np.zeros((3 * (int(edge_colour.max()) + 1) if self._raised else 0, again.size)),
             pressing=self._pressing,
             following=self._following,
-            friction=friction,
         )
 
     def _near(self, nodes: Array) -> Array:
@@ -222,7 +217,7 @@ class Followed:
         """Return how the fluid's momentum depends on a configuration and on velocities, shapes (size, size)."""
         fluid, size, nodes = again.problem.fluid, again.size, again.of_nodes
         fluid.node_velocity[:] = velocity
-        found = self._differences(again, self._colours, self._edge_colours, FrozenChange.absent())
+        found = self._differences(again, self._colours, self._edge_colours)
         differentiate_momentum(again.problem, found, at, again.spare, again.stage, 0.1 * FINE * self._shortest)
         inertia = np.zeros((len(nodes), 3, 3))
         for end in range(2):

@@ -19,7 +19,6 @@ from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.observed.frame import Description
 from bilayer_core.simulation.gains import put_gains
 from bilayer_core.simulation.gradients.course import Course
-from bilayer_core.simulation.gradients.followed import FOLLOWING
 from bilayer_core.simulation.gradients.nearby import (
     PLACES,
     Builders,
@@ -29,7 +28,7 @@ from bilayer_core.simulation.gradients.nearby import (
     values_of,
 )
 from bilayer_core.simulation.gradients.parameters import STEP, scene_with
-from bilayer_core.simulation.gradients.step_again import KeptStep
+from bilayer_core.simulation.gradients.step_again import FOLLOWING, KeptStep
 from bilayer_core.simulation.gradients.step_rates import Inputs, Rates, StepRates
 from bilayer_core.simulation.gradients.varied_numbers import Number, VariedNumbers, inertia_of
 from bilayer_core.simulation.stepper import Stepper

@@ -18,15 +18,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bilayer_core.engine.gradient_differences import StrainDifferences
-from bilayer_core.forces.body_drag import body_flow_of
+from bilayer_core.engine.stage_maps import differentiate_turns
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.scene.transduction import lagged
-from bilayer_core.simulation.gradients.body_rates import BodyRates, drag_by_origin
+from bilayer_core.simulation.gradients.body_rates import BodyRates
 from bilayer_core.simulation.gradients.entries import Entries
-from bilayer_core.simulation.gradients.followed import FOLLOWING, Followed
+from bilayer_core.simulation.gradients.followed import Followed
 from bilayer_core.simulation.gradients.mechanism_rates import resistances, slopes_of_motions
-from bilayer_core.simulation.gradients.step_again import KeptStep, Lacking, StepAgain, cross_matrices
+from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -276,7 +276,6 @@ class StageRates:
     momentum_length: float
     strains: Strains
     by_laws: Array  # ∂g/∂η, of unknowns
-    lacking: Entries | None = None  # G
     by_turn: Entries | None = None  # ∂g/∂a apart from the Hessian, shape (size, n_edge)
     by_director: Entries | None = None  # ∂g by strains at the origin, by drag
     by_origin: Entries | None = None  # ∂g/∂Ȳ by the gyroscopic force, shape (size, size)
@@ -300,9 +299,7 @@ class StageDerivatives:
             by_strain=np.zeros((self.constants.colours, again.size)),
         )
         self.follower = Followed(model, again)
-        self._body_flow = body_flow_of(model)
         self._resisted = "joint friction" in model.forces
-        self._moving = [n for n in (*FOLLOWING, "inertia", "damping") if n in model.forces]
 
     def strains(self, again: StepAgain, at: Configuration) -> Strains:
         """Return ∂σ/∂q at a configuration."""
@@ -316,8 +313,8 @@ class StageDerivatives:
             slopes = own if slopes is None else own + slopes
         return Strains(constants, again, at, slopes)
 
-    def of(self, again: StepAgain, n: int, step: KeptStep, followed: Lacking) -> StageRates:
-        """Return the maps of stage n of a step; what its Hessian lacks by forces that follow is known."""
+    def of(self, again: StepAgain, n: int, step: KeptStep) -> StageRates:
+        """Return the maps of stage n of a step, what its Hessian lacks by forces that follow being written."""
         constants, stage, at = self.constants, again.stage, again.places[n + 1]
         found = StageRates(stage.length, stage.momentum_length, self.strains(again, at), self._by_laws(again, at))
         if again.of_bodies.size:
@@ -327,19 +324,29 @@ class StageDerivatives:
         if self._resisted:
             found.resistance = resistances(again)[:, None]
         if constants.in_space:
-            self._turning(again, n, found)
-        if followed[0] is not None:
-            self._add_followed(found, *followed[:2])
-            found.by_director = followed[2]
-        if self._body_flow.exists:
-            drag = drag_by_origin(self._body_flow, again, at)
-            found.by_origin = drag if found.by_origin is None else found.by_origin + drag
-        if found.bodies:
-            found.bodies.add_slides(again, at, followed[3])
+            differentiate_turns(again.problem, again.maps, again.places[n], again.guesses[n], at, stage)
+            again.lacks = True
+            found.way = tuple(again.maps.way.copy())
+            if again.overfull:
+                self.follower.write(again, n)
+                differentiate_turns(again.problem, again.maps, again.places[n], again.guesses[n], at, stage)
         if again.wet:
             velocity = (at.position - stage.origin_position) / stage.length
             found.momentum = self.follower.momentum(again, at, velocity)
             again.follow(at)
+        maps = again.maps
+        found.by_origin = entries_of(maps.by_origin, (again.size, again.size))
+        if found.bodies:
+            found.bodies.slides = entries_of(maps.slides, (again.size, 6 * len(again.of_bodies)))
+        e = maps.edge_of[found.by_origin.column]
+        own = e >= 0
+        edges = np.arange(len(again.of_edges))
+        found.by_turn = Entries(found.by_origin.row[own], e[own], -found.by_origin.value[own], (again.size, len(edges))) + Entries(again.of_edges, edges, maps.by_turn, (again.size, len(edges)))
+        if len(maps.by_director):
+            k = again.problem.raised.edge
+            rows = np.broadcast_to(constants.of_edge[k][:, :, None], maps.by_director.shape)
+            cols = np.broadcast_to(constants.raised_rows[:, None, :], maps.by_director.shape)
+            found.by_director = Entries(rows.ravel(), cols.ravel(), maps.by_director.ravel().copy(), (again.size, constants.strains))
         drives, laws = again.problem.drives, again.laws
         if len(laws):
             slope = 1.0 - (laws / drives.law_saturation) ** 2
@@ -355,59 +362,6 @@ class StageDerivatives:
         again.differentiate_by_laws(at, self._differences, STRAIN)
         return self._differences.by_law.T.copy()
 
-    def _turning(self, again: StepAgain, n: int, found: StageRates) -> None:
-        """Add what the turns of edges, and their gyroscopic force, ask for."""
-        constants, stage, at, strands = self.constants, again.stage, again.places[n + 1], again.problem.strands
-        edges = len(constants.spin_inertia)
-        by_start, by_guess = _holonomy(edges, again.places[n], again.guesses[n])
-        more, by_end = _holonomy(edges, again.guesses[n], at)
-        found.way = by_start, by_guess + more, by_end
-        t, length, inertia = at.tangent[:edges], at.length[:edges, None], constants.spin_inertia[:, None]
-        x, origin, i = at.position, stage.origin_position, strands.edge_node
-        lengthened = (x[i + 1] - x[i]) - (origin[i + 1] - origin[i])
-        turned = (at.total_angle - stage.origin_angle)[:, None]
-        factor = inertia / (stage.length * length) ** 2
-        around = _cross(t, lengthened)
-        force = factor * turned * around
-        along = (np.eye(3) - t[:, :, None] * t[:, None, :]) / length[:, :, None]
-        scaled, crossing = (factor * turned)[:, :, None], cross_matrices(t)
-        again.forces(at, self._moving)
-        ahead = again.sums.edge[:edges, 3]  # moments of forces that see turns since the start of the stage
-        by_vector = scaled * (crossing - cross_matrices(lengthened) @ along)
-        by_vector -= 2.0 * force[:, :, None] * (t / length)[:, None, :]
-        by_vector += 0.5 * crossing * (ahead / at.length[:edges] ** 2)[:, None, None]
-        spin = constants.turn_inertia / stage.momentum_length + constants.damping * constants.spin_inertia
-        by_turn = np.concatenate([factor * around, (spin / stage.length)[:, None]], axis=1)
-        blocks = np.zeros((edges, 4, 4))
-        blocks[:, :, :3] = by_turn[:, :, None] * by_end[:, None, :]
-        blocks[:, :3, :3] += by_vector
-        blocks[:, :3, 3] = by_turn[:, :3]
-        found.lacking = constants.by_edges(blocks)
-        column = np.repeat(np.arange(edges), 7)
-        value = (by_turn[:, _COMPONENT] * _FORCE).ravel()
-        found.by_turn = Entries(constants.of_edge.ravel(), column, value, (constants.size, edges))
-        blocks[:, 3] = 0.0
-        blocks[:, :3, :3] = -scaled * crossing
-        blocks[:, :3, 3] *= -1.0
-        found.by_origin = constants.by_edges(blocks)
-
-    def _add_followed(self, found: StageRates, by_place: Entries, by_origin: Entries) -> None:
-        """Add what forces take from the end of the stage, and their dependence on its origin.
-
-        They depend on turns over the stage: by the turn at its end as by that at its origin, but for the sign.
-        """
-        if found.way:
-            constants, edge = self.constants, self.constants.edge_of[by_origin.column]
-            turns = np.flatnonzero((edge >= 0) & (by_origin.value != 0.0))
-            row, edge, value = by_origin.row[turns], edge[turns], -by_origin.value[turns]
-            found.by_turn += Entries(row, edge, value, found.by_turn.shape)
-            by_nodes = value[:, None] * found.way[2][edge]
-            column = constants.of_edge[edge, :6].ravel()
-            value = np.concatenate([-by_nodes, by_nodes], axis=1).ravel()
-            by_place = by_place + found.lacking + Entries(np.repeat(row, 6), column, value, by_place.shape)
-            by_origin = by_origin + found.by_origin
-        found.lacking, found.by_origin = by_place, by_origin
-
     def _lag(self, again: StepAgain, n: int, step: KeptStep) -> Array:
         """Return what each mode takes of what it had reached, of the first stimulus and of that of the stage."""
         drives, inputs, state = again.problem.drives, again.inputs, step.start
@@ -422,10 +376,8 @@ class StageDerivatives:
         return found
 
 
-def _holonomy(edges: int, first: Configuration, second: Configuration) -> tuple[Array, Array]:
-    """Return by what changes of their vectors at both ends of a transport turn edges, beyond what frames turn, shapes
-    (n_edge, 3).
-    """
-    a, b = first.tangent[:edges], second.tangent[:edges]
-    half = _cross(a, b) / (1.0 + np.einsum("ki,ki->k", a, b))[:, None]  # across both tangents
-    return half / first.length[:edges, None], half / second.length[:edges, None]
+def entries_of(m, shape):
+    reach = m.band.shape[1] // 2
+    row, place = np.nonzero(m.band)
+    n = int(m.count[0])
+    return Entries(np.concatenate([row, m.row[:n]]), np.concatenate([row + place - reach, m.column[:n]]), np.concatenate([m.band[row, place], m.value[:n]]), shape)

@@ -15,28 +15,28 @@ import numpy as np
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.engine.gradient_differences import StrainDifferences, differentiate_by_laws, differentiate_by_strains
 from bilayer_core.engine.linear.krylov_solution import Lack, solve_with_lack
+from bilayer_core.engine.linear.lacking_matrix import LackingMatrix
 from bilayer_core.engine.linear.newton_matrix import solve
+from bilayer_core.engine.stage_maps import StageMaps
 from bilayer_core.engine.step_ends import end_stage
 from bilayer_core.engine.steps_again import Reached, begin_stage, begin_step, expect_end, follow, go_to
 from bilayer_core.errors import SimulationError
+from bilayer_core.model.force_slots import NAMES
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Method, StateArrays
 from bilayer_core.model.state import State
-from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.surroundings import Surroundings
 
 Array = np.ndarray
-Lacking = tuple[Entries | None, Entries | None, Entries | None, Array | None]
-"""What a Hessian lacks, and the gradient by the origin of a stage, by directors there, and by the turns R̃ and spins ω̃
-of free bodies (`BodyRates.slides`); None for nothing. Forces are those on all nodes, those among them that bodies hold.
-"""
 ROUNDS, ROUNDED = 80, 1e-13
 """Of solutions with what a Hessian lacks: the most there may be, and what may be left, of the whole."""
 SMALL = 1e-3
 """Angles below which Jacobians are series [rad]."""
 ELASTIC = ("stretching", "bending", "twisting", "flattening", "bond", "viscosity")
 """Forces that see eigenstrains."""
+FOLLOWING = ("drag", "turning drag", "added mass", "followers", "moments", "friction", "rod friction")
+"""Forces that take something from the configuration."""
 MOST = 12
 """Corrections of a stage."""
 ENOUGH = 1e-13
@@ -132,7 +132,6 @@ class StepAgain(Evaluator):
         self._size = max(rod.path.length for rod in model.scene.rods)
         self._tolerance = tolerance
         self._settles = not {"friction", "rod friction"}.isdisjoint(model.forces)
-        self._lack: Lack | None = None
         self._elastic = [name for name in ELASTIC if name in model.forces]
         layout = self.problem.strands
         self.of_nodes = layout.node_unknown[:, None] + np.arange(3)
@@ -141,6 +140,58 @@ class StepAgain(Evaluator):
         self.size = self._rods + 6 * bodies
         self.of_bodies = self._rods + np.arange(6 * bodies).reshape(bodies, 6)
         self.wet = self.size if self.problem.fluid.exists else 0
+        self._room = 0
+        self.lacks = False
+        self.grow_maps(256)
+
+    def grow_maps(self, room: int) -> None:
+        """Make maps with room for so many entries beside bands; they are zero."""
+        problem, bodies = self.problem, len(self.problem.bodies.mass)
+        reach, edges = _reach(self), len(self.of_edges)
+
+        def matrix(width: int) -> LackingMatrix:
+            return LackingMatrix(
+                band=np.zeros((self._rods if width else 0, width)),
+                count=np.zeros(1, dtype=np.int64),
+                row=np.zeros(room, dtype=np.int64),
+                column=np.zeros(room, dtype=np.int64),
+                value=np.zeros(room),
+            )
+
+        edge_of = np.full(self.size, -1)
+        edge_of[self.of_edges] = np.arange(edges)
+        moving = [n for n in (*FOLLOWING, "inertia", "damping") if n in self.model.forces]
+        self._room, self.maps = (
+            room,
+            StageMaps(
+                lacking=matrix(2 * reach + 1),
+                by_origin=matrix(2 * reach + 1),
+                by_turn=np.zeros(edges),
+                slides=matrix(0),
+                by_director=np.zeros((len(problem.raised.edge), 7, 3)),
+                way=np.zeros((3, edges, 3)),
+                edge_of=edge_of,
+                moving=np.array([name in moving for name in NAMES]),
+            ),
+        )
+        self._lack = Lack(
+            matrix=self.maps.lacking,
+            basis=np.zeros((ROUNDS + 1, self.size)),
+            projected=np.zeros((ROUNDS, ROUNDS + 1)),
+            turns=np.zeros((ROUNDS, 2)),
+            rest=np.zeros(ROUNDS + 1),
+            spread=np.zeros(self.size),
+            force=np.zeros(self.size),
+        )
+
+    @property
+    def overfull(self) -> bool:
+        """Whether there was too little room for entries of maps; now there is more, and maps are zero."""
+        most = max(int(of.count[0]) for of in (self.maps.lacking, self.maps.by_origin, self.maps.slides))
+        if most > self._room:
+            self.grow_maps(2 * most)
+            return True
+        return False
 
     def begin(self, step: KeptStep) -> None:
         """Take the start of a step, with what acts during it."""
@@ -263,16 +314,16 @@ class StepAgain(Evaluator):
         """Rotation vectors of free bodies in earlier stages, from their origins, shapes (n_free, 3)."""
         return [of[self.problem.bodies.body_of_free].copy() for of in self._work.gained_rotation_vector]
 
-    def find(self, n: int, matrices: Callable[[StepAgain, int], Lacking]) -> tuple[Reached, float, Lacking]:
-        """Go to where stage n ended, and factorise the Hessian there; return where, the last correction [m], and what
-        the Hessian lacks there, as `matrices` has it.
+    def find(self, n: int, write_maps: Callable[[StepAgain, int], None]) -> tuple[Reached, float]:
+        """Go to where stage n ended, factorise the Hessian there, and write what it lacks; return where, and the last
+        correction [m].
         """
         work, step, reached = self._work, self._step, self.reached
         self._end.take(step.end)
         between = self._arrays, self._end_arrays, step.method, work, n, step.length
         expect_end(self.problem, *between, self.places[0], self.guesses[n], reached)
         self.go(n, reached)
-        lacking: Lacking = (None, None, None, None)
+        self.lacks = written = False
         for k in range(MOST):
             at = self.places[n + 1]
             self.evaluate(at, second=True)
@@ -281,8 +332,9 @@ class StepAgain(Evaluator):
             if shift or simplified:
                 raise SimulationError("gradient: a step ends where the shape is unstable", self._step.begin)
             if k and self._settles:
-                lacking = matrices(self, n)
-            travel = -self.solved(n, gradient[:, None], lacking[0])[:, 0]
+                write_maps(self, n)
+                written = True
+            travel = -self.solved(n, gradient[:, None])[:, 0]
             moved = np.abs(travel[self.of_nodes]).max()
             turned = (
                 np.abs(travel[self.of_edges]).max(initial=0.0),
@@ -294,46 +346,27 @@ class StepAgain(Evaluator):
             self.travel(at, travel, self.spare)
             self.places[n + 1], self.spare = self.spare, at
             self.follow(self.places[n + 1])
-        if lacking[0] is None:
-            lacking = matrices(self, n)
+        if not written:
+            write_maps(self, n)
         at = self.places[n + 1]
         reached.position[:], reached.turn[:] = at.position, at.total_angle - self.guesses[n].total_angle
         reached.body_position[:], reached.body_rotation[:] = at.body_position, at.body_rotation
-        return reached, float(moved), lacking
+        return reached, float(moved)
 
-    def solved(self, n: int, right: Array, lacking: Entries | None) -> Array:
-        """Return the inverse of the factorised Hessian, where stage n ended, and what it lacks, times columns."""
+    def solved(self, n: int, right: Array, back: bool = False) -> Array:
+        """Return the inverse of the factorised Hessian, where stage n ended, and what it lacks, `back` that of the
+        transpose, times columns.
+        """
         problem, sums, found = self.problem, self.sums, np.empty(right.shape)
-        if lacking is not None:
-            lack = self._lack_of(lacking)
         for k in range(right.shape[1]):
             sums.gradient[:], sums.body[:] = right[: self._rods, k], right[self._rods :, k].reshape(-1, 6)
-            if lacking is None:
-                solve(problem)
+            if self.lacks:
+                solve_with_lack(problem, self.places[n + 1], self._lack, ROUNDED, back)
             else:
-                solve_with_lack(problem, self.places[n + 1], lack, ROUNDED)
+                solve(problem)
             found[: self._rods, k] = problem.system.step
             found[self._rods :, k] = problem.system.body_step.ravel()
-        return -found if lacking is None else found
-
-    def _lack_of(self, lacking: Entries) -> Lack:
-        """Return entries with scratch, the same as long as there is room."""
-        count, found = len(lacking.row), self._lack
-        if found is None or len(found.row) < count:
-            found = self._lack = Lack(
-                count=np.zeros(1, dtype=np.int64),
-                row=np.zeros(2 * count, dtype=np.int64),
-                column=np.zeros(2 * count, dtype=np.int64),
-                value=np.zeros(2 * count),
-                basis=np.zeros((ROUNDS + 1, self.size)),
-                projected=np.zeros((ROUNDS, ROUNDS + 1)),
-                turns=np.zeros((ROUNDS, 2)),
-                rest=np.zeros(ROUNDS + 1),
-                spread=np.zeros(self.size),
-            )
-        found.count[0] = count
-        found.row[:count], found.column[:count], found.value[:count] = lacking.row, lacking.column, lacking.value
-        return found
+        return found if self.lacks else -found
 
     def differentiate_by_laws(self, at: Configuration, differences: StrainDifferences, change: float) -> None:
         """Write how the gradient at a configuration depends on the eigenstrain of each law; see `StrainDifferences`."""
@@ -344,6 +377,18 @@ class StepAgain(Evaluator):
         """Write how the gradient at a configuration depends on strains at the origin; see `StrainDifferences`."""
         self.select(at, self._elastic)
         differentiate_by_strains(self.problem, differences, at, self.stage, change)
+
+
+def _reach(again: StepAgain) -> int:
+    """Return how far apart unknowns of two edges that follow each other are, but for those where a rod closes."""
+    strands = again.problem.strands
+    seen = np.concatenate([again.of_nodes[strands.edge_node], again.of_nodes[strands.edge_node + 1]], axis=1)
+    seen = np.concatenate([seen, again.of_edges[:, None]], axis=1)
+    before, after = strands.joint_a[: strands.bend_count], strands.joint_b[: strands.bend_count]
+    inner = np.maximum(before, after) < len(seen)
+    both = np.concatenate([seen[before[inner]], seen[after[inner]]], axis=1)
+    apart = (both if len(both) else seen).max(axis=1) - (both if len(both) else seen).min(axis=1)
+    return int(np.median(apart))
 
 
 def cross_matrix(v: Array) -> Array:

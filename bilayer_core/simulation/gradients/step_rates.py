@@ -117,10 +117,10 @@ class StepRates:
                 self._start_strains = self._of.strains(again, again.places[0])
                 if again.wet:
                     self._start_momentum = self._of.follower.momentum(again, again.places[0], step.start.velocity)
-            place, correction, followed = again.find(n, self._of.follower.matrices)
+            place, correction = again.find(n, self._of.follower.write)
             reached.append(place)
             self.residual = max(self.residual, correction / step.length)
-            self._stages.append(self._of.of(again, n, step, followed))
+            self._stages.append(self._of.of(again, n, step))
         return reached
 
     @property
@@ -195,6 +195,7 @@ class StepRates:
             if stage.by_director is not None:
                 right += stage.by_director @ origin[constants.of_strains]
             if bodies:
+                right += bodies.slides @ ahead.reshape(-1, ahead.shape[2])
                 right = bodies.gather(right)
                 bodies.push(ahead, right)
             if len(stage.law_by_gain):
@@ -202,7 +203,7 @@ class StepRates:
                 right += stage.by_laws @ laws
             if direct is not None:
                 right += direct[n]
-            moved = -self._agains[n].solved(n, constants.free * right, stage.lacking)
+            moved = -self._agains[n].solved(n, constants.free * right)
             if bodies:
                 moved = bodies.spread(moved)
             end = np.concatenate([moved, stage.strains @ moved, none])
@@ -264,13 +265,12 @@ class StepRates:
             if stage.way:
                 moved += constants.along_back(stage.way[2], ends[n][edges])
                 before += ends[n][edges]
-            transposed = None if stage.lacking is None else stage.lacking.T
             moved = bodies.gather(moved) if bodies else constants.free * moved
-            right = direct[n] = -self._agains[n].solved(n, moved, transposed)
+            right = direct[n] = -self._agains[n].solved(n, moved, True)
             spread = bodies.spread(right) if bodies else right
             change = np.concatenate([spread, stage.strains @ spread, np.zeros_like(of_momentum)])
             if bodies:
-                ahead += bodies.push_back(right)
+                ahead += bodies.push_back(right) + (bodies.slides.T @ spread).reshape(ahead.shape)
             if stage.momentum:
                 origin_speeds[n][fluid] -= spread / stage.momentum_length
             of_mass = constants.masses(change)
