@@ -22,7 +22,7 @@ from bilayer_core.forces.raised import director_motion
 from bilayer_core.forces.turning_drag import TurningFlow
 from bilayer_core.jit import kernel, piece, record
 from bilayer_core.jit.called import stack_matrix
-from bilayer_core.jit.record import Flags, Indices, Matrix, Stack, Vector
+from bilayer_core.jit.record import Flags, Indices, Stack, Vector
 from bilayer_core.kinematics.vector import combine, cross, dot, row, scaled
 from bilayer_core.model.records.parts import Flow
 from bilayer_core.model.records.problem import Problem

@@ -29,7 +29,7 @@ class Lack:
 
 
 @kernel
-def _spread(p, at, out):
+def spread(p, at, out):
     """Write the motions of nodes that bodies hold from those of the bodies."""
     constrained, rods = p.constrained, p.sums.gradient.shape[0]
     for k in range(constrained.unknown.shape[0]):
@@ -43,17 +43,18 @@ def _spread(p, at, out):
 
 
 @kernel
-def _gather(p, at):
+def gather(p, at, forces):
     """Move forces on nodes that bodies hold to the bodies."""
-    constrained, gradient, body = p.constrained, p.sums.gradient, p.sums.body
+    constrained, rods = p.constrained, p.sums.gradient.shape[0]
     for k in range(constrained.unknown.shape[0]):
         a, f = constrained.unknown[k], constrained.free[k]
         if f >= 0:
+            b = rods + 6 * f
             for c in range(3):
                 i, j = (c + 1) % 3, (c + 2) % 3
-                body[f, c] += gradient[a + c]
-                body[f, 3 + c] += at.arm[k, i] * gradient[a + j] - at.arm[k, j] * gradient[a + i]
-        gradient[a] = gradient[a + 1] = gradient[a + 2] = 0.0
+                forces[b + c] += forces[a + c]
+                forces[b + 3 + c] += at.arm[k, i] * forces[a + j] - at.arm[k, j] * forces[a + i]
+        forces[a] = forces[a + 1] = forces[a + 2] = 0.0
 
 
 @kernel
@@ -95,17 +96,17 @@ def solve_with_lack(p, at, lack, enough, back):
     for j in range(size):
         basis[0, j] /= whole
     while count < projected.shape[0] and abs(rest[count]) > enough * whole:
-        now, after, spread = basis[count], basis[count + 1], lack.spread
+        now, after, moved = basis[count], basis[count + 1], lack.spread
         for j in range(size):
-            spread[j] = now[j]
-        _spread(p, at, spread)
+            moved[j] = now[j]
+        spread(p, at, moved)
         lack.force[:] = 0.0
-        multiply(lack.matrix, spread, back, lack.force)
+        multiply(lack.matrix, moved, back, lack.force)
+        gather(p, at, lack.force)
         for j in range(rods):
             p.sums.gradient[j] = lack.force[j]
         for j in range(rods, size):
             p.sums.body[(j - rods) // 6, (j - rods) % 6] = lack.force[j]
-        _gather(p, at)
         _solve(p, after)
         for j in range(size):
             after[j] += now[j]

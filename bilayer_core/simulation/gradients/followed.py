@@ -24,7 +24,7 @@ from bilayer_core.model.force_slots import NAMES
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.simulation.gradients.entries import Entries
-from bilayer_core.simulation.gradients.step_again import StepAgain, cross_matrix
+from bilayer_core.simulation.gradients.step_again import StepAgain
 
 Array = np.ndarray
 BY_DIFFERENCES = ("added mass", "followers", "moments", "rod friction")
@@ -38,7 +38,6 @@ SLIP = 1e-3
 """Likewise, where differences see no kink of friction."""
 ORIGIN = ("origin_position", "origin_angle")
 """Parts of a stage that are moved."""
-_MOMENT = np.array([[2, 1], [0, 2], [1, 0]])
 
 
 def _rounded(h: float) -> float:
@@ -136,13 +135,13 @@ class Followed:
 
     @staticmethod
     def _add_moments(again: StepAgain, at: Configuration) -> None:
-        """Add what moments on bodies are by turns of R̃ (`forces.loads`)."""
+        """Add what moments on bodies are by turns of R̃ (`forces.loads`): those of −½ [M]× [e]× R̃ Rᵀ."""
         moments, rows = again.problem.moments, again.of_bodies
-        for f, moment in zip(moments.body, moments.present, strict=True):
+        for f, m in zip(moments.body, moments.present, strict=True):
             turn = again.stage.predicted_body_rotation[f] @ at.body_rotation[f].T
             for c in range(3):
-                change = 0.5 * cross_matrix(moment) @ cross_matrix(np.eye(3)[c]) @ turn
-                value = (change.T - change)[_MOMENT[:, 0], _MOMENT[:, 1]]
+                change = -0.5 * (np.outer(np.eye(3)[c], m) - m[c] * np.eye(3)) @ turn
+                value = (change - change.T)[[2, 0, 1], [1, 2, 0]]
                 shape = again.size, 6 * len(rows)
                 append(again.maps.slides, Entries(rows[f, 3:], np.full(3, 6 * f + c), value, shape))
 
@@ -212,6 +211,10 @@ class Followed:
         """Return the matrix with entries that are not 0."""
         kept = np.flatnonzero(value)
         return Entries(self._row[kept], self._column[kept], value[kept], self._shape)
+
+    def most_entries(self, again: StepAgain) -> int:
+        """Return how many entries the first matrix of `momentum` has at most."""
+        return len(self._row) + again.of_bodies.size * again.size
 
     def momentum(self, again: StepAgain, at: Configuration, velocity: Array) -> tuple[Entries, Entries]:
         """Return how the fluid's momentum depends on a configuration and on velocities, shapes (size, size)."""

@@ -6,12 +6,12 @@ its stages follow from these; Newton's method then makes corrections that the ro
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from bilayer_core.engine.body_maps import BodyMaps, write_body_maps
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.engine.gradient_differences import StrainDifferences, differentiate_by_laws, differentiate_by_strains
 from bilayer_core.engine.linear.krylov_solution import Lack, solve_with_lack
@@ -19,6 +19,7 @@ from bilayer_core.engine.linear.lacking_matrix import LackingMatrix
 from bilayer_core.engine.linear.newton_matrix import solve
 from bilayer_core.engine.stage_maps import StageMaps
 from bilayer_core.engine.step_ends import end_stage
+from bilayer_core.engine.step_response import ROUNDED
 from bilayer_core.engine.steps_again import Reached, begin_stage, begin_step, expect_end, follow, go_to
 from bilayer_core.errors import SimulationError
 from bilayer_core.model.force_slots import NAMES
@@ -29,10 +30,8 @@ from bilayer_core.model.state import State
 from bilayer_core.simulation.surroundings import Surroundings
 
 Array = np.ndarray
-ROUNDS, ROUNDED = 80, 1e-13
-"""Of solutions with what a Hessian lacks: the most there may be, and what may be left, of the whole."""
-SMALL = 1e-3
-"""Angles below which Jacobians are series [rad]."""
+ROUNDS = 80
+"""Of solutions with what a Hessian lacks, at most."""
 ELASTIC = ("stretching", "bending", "twisting", "flattening", "bond", "viscosity")
 """Forces that see eigenstrains."""
 FOLLOWING = ("drag", "turning drag", "added mass", "followers", "moments", "friction", "rod friction")
@@ -146,7 +145,7 @@ class StepAgain(Evaluator):
 
     def grow_maps(self, room: int) -> None:
         """Make maps with room for so many entries beside bands; they are zero."""
-        problem, bodies = self.problem, len(self.problem.bodies.mass)
+        problem = self.problem
         reach, edges = _reach(self), len(self.of_edges)
 
         def matrix(width: int) -> LackingMatrix:
@@ -174,7 +173,7 @@ class StepAgain(Evaluator):
                 moving=np.array([name in moving for name in NAMES]),
             ),
         )
-        self._lack = Lack(
+        self.lack = Lack(
             matrix=self.maps.lacking,
             basis=np.zeros((ROUNDS + 1, self.size)),
             projected=np.zeros((ROUNDS, ROUNDS + 1)),
@@ -309,11 +308,6 @@ class StepAgain(Evaluator):
         """Return the gradient of the last evaluation, shape (size,)."""
         return np.concatenate([self.sums.gradient, self.sums.body.ravel()])
 
-    @property
-    def turned(self) -> list[Array]:
-        """Rotation vectors of free bodies in earlier stages, from their origins, shapes (n_free, 3)."""
-        return [of[self.problem.bodies.body_of_free].copy() for of in self._work.gained_rotation_vector]
-
     def find(self, n: int, write_maps: Callable[[StepAgain, int], None]) -> tuple[Reached, float]:
         """Go to where stage n ended, factorise the Hessian there, and write what it lacks; return where, and the last
         correction [m].
@@ -334,7 +328,7 @@ class StepAgain(Evaluator):
             if k and self._settles:
                 write_maps(self, n)
                 written = True
-            travel = -self.solved(n, gradient[:, None])[:, 0]
+            travel = -self._solved(n, gradient)
             moved = np.abs(travel[self.of_nodes]).max()
             turned = (
                 np.abs(travel[self.of_edges]).max(initial=0.0),
@@ -353,20 +347,21 @@ class StepAgain(Evaluator):
         reached.body_position[:], reached.body_rotation[:] = at.body_position, at.body_rotation
         return reached, float(moved)
 
-    def solved(self, n: int, right: Array, back: bool = False) -> Array:
-        """Return the inverse of the factorised Hessian, where stage n ended, and what it lacks, `back` that of the
-        transpose, times columns.
-        """
-        problem, sums, found = self.problem, self.sums, np.empty(right.shape)
-        for k in range(right.shape[1]):
-            sums.gradient[:], sums.body[:] = right[: self._rods, k], right[self._rods :, k].reshape(-1, 6)
-            if self.lacks:
-                solve_with_lack(problem, self.places[n + 1], self._lack, ROUNDED, back)
-            else:
-                solve(problem)
-            found[: self._rods, k] = problem.system.step
-            found[self._rods :, k] = problem.system.body_step.ravel()
+    def _solved(self, n: int, right: Array) -> Array:
+        """Return the inverse of the factorised Hessian, where stage n ended, and what it lacks, times a vector."""
+        problem, sums = self.problem, self.sums
+        sums.gradient[:], sums.body[:] = right[: self._rods], right[self._rods :].reshape(-1, 6)
+        if self.lacks:
+            solve_with_lack(problem, self.places[n + 1], self.lack, ROUNDED, False)
+        else:
+            solve(problem)
+        found = np.concatenate([problem.system.step, problem.system.body_step.ravel()])
         return found if self.lacks else -found
+
+    def write_body_maps(self, n: int, maps: BodyMaps) -> None:
+        """Write the maps of free bodies in stage n."""
+        step = self._step
+        write_body_maps(self.problem, self._arrays, step.method, self._work, n, step.length, self.places[n + 1], maps)
 
     def differentiate_by_laws(self, at: Configuration, differences: StrainDifferences, change: float) -> None:
         """Write how the gradient at a configuration depends on the eigenstrain of each law; see `StrainDifferences`."""
@@ -389,30 +384,3 @@ def _reach(again: StepAgain) -> int:
     both = np.concatenate([seen[before[inner]], seen[after[inner]]], axis=1)
     apart = (both if len(both) else seen).max(axis=1) - (both if len(both) else seen).min(axis=1)
     return int(np.median(apart))
-
-
-def cross_matrix(v: Array) -> Array:
-    """Return the matrix [v]×, shape (3, 3)."""
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-
-
-def cross_matrices(of: Array) -> Array:
-    """Return the matrices [v]× of vectors, shape (n, 3, 3)."""
-    out = np.zeros((len(of), 3, 3))
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -of[:, 2], of[:, 1], -of[:, 0]
-    return out - out.swapaxes(1, 2)
-
-
-def left_jacobian(v: Array) -> Array:
-    """Return by what exp([v]×) turns more for an increment of v."""
-    angle, k = math.sqrt(float(v @ v)), cross_matrix(v)
-    if angle < SMALL:
-        first, second = 0.5 - angle**2 / 24.0, 1.0 / 6.0 - angle**2 / 120.0
-    else:
-        first, second = (1.0 - math.cos(angle)) / angle**2, (angle - math.sin(angle)) / angle**3
-    return np.eye(3) + first * k + second * (k @ k)
-
-
-def rotation_of(v: Array) -> Array:
-    """Return exp([v]×)."""
-    return np.eye(3) + cross_matrix(v) @ left_jacobian(v)
