@@ -193,14 +193,14 @@ def _write_history(p, state, method, n, h, f, maps):
     b, along, bend = p.bodies.body_of_free[f], method.along[n] * h, method.bend * h * h
     inertia, inverse, jacobian = stack_matrix(3, 3), stack_matrix(3, 3), stack_matrix(3, 3)
     of_spin, of_moment, of_rate, part = stack_matrix(3, 3), stack_matrix(3, 3), stack_matrix(3, 3), stack_matrix(3, 3)
-    spin, rate, l, m = state.body_angular_velocity, stack_vector(3), stack_vector(3), stack_vector(3)
+    spin, rate, own, m = state.body_angular_velocity, stack_vector(3), stack_vector(3), stack_vector(3)
     inertia_tensor(p.bodies.second_moment, f, state.body_rotation, b, inertia)
     _inverse(inertia, inverse)
     for c in range(3):
-        l[c] = inertia[c, 0] * spin[b, 0] + inertia[c, 1] * spin[b, 1] + inertia[c, 2] * spin[b, 2]
+        own[c] = inertia[c, 0] * spin[b, 0] + inertia[c, 1] * spin[b, 1] + inertia[c, 2] * spin[b, 2]
     for c in range(3):
         i, j = (c + 1) % 3, (c + 2) % 3
-        m[c] = state.body_moment[f, c] - (spin[b, i] * l[j] - spin[b, j] * l[i])
+        m[c] = state.body_moment[f, c] - (spin[b, i] * own[j] - spin[b, j] * own[i])
     for c in range(3):
         rate[c] = inverse[c, 0] * m[0] + inverse[c, 1] * m[1] + inverse[c, 2] * m[2]
     _turn_of(
@@ -212,7 +212,7 @@ def _write_history(p, state, method, n, h, f, maps):
     )
     for by in range(3):  # the turn at the start, L and M
         one_turn, one_momentum, one_moment = 1.0 * (by == 0), 1.0 * (by == 1), 1.0 * (by == 2)
-        _cross_matrix(one_turn * l[0], one_turn * l[1], one_turn * l[2], part)
+        _cross_matrix(one_turn * own[0], one_turn * own[1], one_turn * own[2], part)
         for c in range(3):
             part[c, c] += one_momentum
         _cross_matrix(-one_turn * spin[b, 0], -one_turn * spin[b, 1], -one_turn * spin[b, 2], of_spin)
@@ -221,7 +221,7 @@ def _write_history(p, state, method, n, h, f, maps):
         _cross_matrix(k * spin[b, 0], k * spin[b, 1], k * spin[b, 2], of_moment)
         for c in range(3):
             of_moment[c, c] += one_moment
-        _cross_matrix(l[0], l[1], l[2], part)
+        _cross_matrix(own[0], own[1], own[2], part)
         _product(part, of_spin, 1.0, of_moment)
         _cross_matrix(one_turn * m[0], one_turn * m[1], one_turn * m[2], part)
         for i in range(3):

@@ -1,7 +1,7 @@
 """Derivatives of friction on surfaces by what its contacts freeze, and by the origin of a stage.
 
-Each contact is frozen anew, by itself, where one of the unknowns that it sees has moved: nodes and turns of the edges at
-its own node, and the bodies that touch. What follows from the changes is exact; see `forces.friction_change`.
+Each contact is frozen anew, by itself, where one of the unknowns that it sees has moved: nodes and turns of the edges
+at its own node, and the bodies that touch. What follows from the changes is exact; see `forces.friction_change`.
 """
 
 from __future__ import annotations

@@ -55,23 +55,10 @@ def clear_maps(maps):
 
 
 @kernel
-def _by_motion_of_edge(at, e, w):
-    """Return what the tangent and the first director of an edge change by as its vector or its angle does."""
-    t, m1, length = row(at.tangent, e), row(at.director1, e), at.length[e]
-    if w == 3:
-        return (0.0, 0.0, 0.0), row(at.director2, e)
-    along = -t[w] / length
-    unit = (
-        (1.0 if w == 0 else 0.0) / length,
-        (1.0 if w == 1 else 0.0) / length,
-        (1.0 if w == 2 else 0.0) / length,
-    )
-    return combine(1.0, unit, along, t), scaled(-m1[w] / length, t)
-
-
-@kernel
-def _resistance_by_edge(at, before, after, e, w, c, v):
-    """Return how drag changes as an edge beside its node moves, with the factors c of directions and the speed v."""
+def _write_by_edge(at, before, after, e, c, v, out):
+    """Write how drag changes as an edge beside its node moves, by its vector and its turn, with the factors c of
+    directions and the speed v, shape (3, 4).
+    """
     t_sum = combine(0.5, row(at.tangent, before), 0.5, row(at.tangent, after))
     size = math.sqrt(dot(t_sum, t_sum))
     t = scaled(1.0 / size, t_sum)
@@ -81,17 +68,24 @@ def _resistance_by_edge(at, before, after, e, w, c, v):
     least = math.sqrt(dot(m_part, m_part))
     m = scaled(1.0 / least, m_part)
     n = cross(t, m)
-    of_t, of_m = _by_motion_of_edge(at, e, w)
-    share = 1.0 if before == after else 0.5
-    of_t, of_m = scaled(share / size, of_t), scaled(share, of_m)
-    of_t = combine(1.0, of_t, -dot(of_t, t), t)
-    of_m = combine(1.0, combine(1.0, of_m, -dot(of_m, t) - dot(m_sum, of_t), t), -along, of_t)
-    of_m = scaled(1.0 / least, combine(1.0, of_m, -dot(of_m, m), m))
-    of_n = combine(1.0, cross(of_t, m), 1.0, cross(t, of_m))
     vt, vm, vn = dot(v, t), dot(v, m), dot(v, n)
-    found = combine(2.0 * c[0] * abs(vt) * dot(v, of_t), t, c[0] * abs(vt) * vt, of_t)
-    found = combine(1.0, found, 1.0, combine(2.0 * c[1] * abs(vm) * dot(v, of_m), m, c[1] * abs(vm) * vm, of_m))
-    return combine(1.0, found, 1.0, combine(2.0 * c[2] * abs(vn) * dot(v, of_n), n, c[2] * abs(vn) * vn, of_n))
+    at_, am, an = c[0] * abs(vt), c[1] * abs(vm), c[2] * abs(vn)
+    share, te, m1, length = 1.0 if before == after else 0.5, row(at.tangent, e), row(at.director1, e), at.length[e]
+    for w in range(4):
+        if w == 3:
+            of_t, of_m = (0.0, 0.0, 0.0), scaled(share, row(at.director2, e))
+        else:
+            unit = 1.0 if w == 0 else 0.0, 1.0 if w == 1 else 0.0, 1.0 if w == 2 else 0.0
+            of_t = combine(share / (size * length), unit, -share / (size * length) * te[w], te)
+            of_m = scaled(-share * m1[w] / length, te)
+        of_t = combine(1.0, of_t, -dot(of_t, t), t)
+        of_m = combine(1.0, combine(1.0, of_m, -dot(of_m, t) - dot(m_sum, of_t), t), -along, of_t)
+        of_m = scaled(1.0 / least, combine(1.0, of_m, -dot(of_m, m), m))
+        of_n = combine(1.0, cross(of_t, m), 1.0, cross(t, of_m))
+        along_t, along_m, along_n = 2.0 * at_ * dot(v, of_t), 2.0 * am * dot(v, of_m), 2.0 * an * dot(v, of_n)
+        for k in range(3):
+            out[k, w] = along_t * t[k] + along_m * m[k] + along_n * n[k]
+            out[k, w] += at_ * vt * of_t[k] + am * vm * of_m[k] + an * vn * of_n[k]
 
 
 @kernel
@@ -136,26 +130,26 @@ def differentiate_drag(p, flow, maps, at, stage):
             e = before if side == 0 else after if side == 1 else -1
             if side == 1 and before == after:
                 continue
-            for w in range(4):
-                if side < 2:
-                    force = _resistance_by_edge(at, before, after, e, w, c, v)
-                else:
-                    force = _resistance_by_origin(flow.direction, k, c, v, min(w, 2), h)
-                by[0, w], by[1, w], by[2, w] = force
-            if side == 2 and r >= 0:
-                _add_by_director(p, at, i, r, middle, by, maps.by_director)
+            if side < 2:
+                _write_by_edge(at, before, after, e, c, v, by)
+            else:
+                _write_by_origin(flow.direction, k, c, v, h, by)
+                if r >= 0:
+                    _add_by_director(p, at, i, r, middle, by, maps.by_director)
             _add_pulled(p, at, i, r, middle, by, e, 1.0, maps.lacking if side < 2 else maps.by_origin)
     return READY
 
 
 @kernel
-def _resistance_by_origin(direction, k, c, v, w, h):
-    """Return how drag changes with a component of the place of its node at the origin."""
-    force = 0.0, 0.0, 0.0
-    for j in range(3):
-        d = row(direction[k], j)
-        force = combine(1.0, force, -2.0 * c[j] * abs(dot(v, d)) * d[w] / h, d)
-    return force
+def _write_by_origin(direction, k, c, v, h, out):
+    """Write how drag changes with the place of its node at the origin, shape (3, 3)."""
+    for w in range(3):
+        out[0, w] = out[1, w] = out[2, w] = 0.0
+        for j in range(3):
+            d = row(direction[k], j)
+            part = -2.0 * c[j] * abs(dot(v, d)) * d[w] / h
+            for i in range(3):
+                out[i, w] += part * d[i]
 
 
 @kernel
@@ -229,18 +223,23 @@ def _add_turned(strands, row_, e, value, way, matrix):
         add_entry(matrix, row_, unknown_of_edge(strands, e, n), (value if n >= 3 else -value) * way[e, n % 3])
 
 
-@piece(int, Problem, StageMaps, Configuration, Configuration, Configuration, Stage)
-def differentiate_turns(p, maps, start, guess, at, stage):
-    """Add what the turns of edges, and their gyroscopic force, ask for, and write their ways."""
+@piece(int, Problem, StageMaps, Configuration, Configuration, Configuration, Stage, bool)
+def differentiate_turns(p, maps, start, guess, at, stage, seen):
+    """Add what the turns of edges, and their gyroscopic force, ask for, and write their ways; `seen` tells whether
+    forces that follow see turns.
+    """
     strands, fluid, sums, h, way = p.strands, p.fluid, p.sums, stage.length, maps.way
     for k in range(sums.selected.shape[0]):
         sums.selected[k] = maps.moving[k]
     add_forces(p, at, stage, False, False)
     way[:] = 0.0
-    of_end, of_origin = stack_matrix(3, 4), stack_matrix(3, 4)
     for e in range(strands.edge_count):
         _write_way(start, guess, e, way[0], way[1])
         _write_way(guess, at, e, way[1], way[2])
+    if seen:
+        _add_turns(strands, maps)
+    of_end, of_origin = stack_matrix(3, 4), stack_matrix(3, 4)
+    for e in range(strands.edge_count):
         i, t, length, inertia = strands.edge_node[e], row(at.tangent, e), at.length[e], strands.spin_inertia[e]
         vector = combine(1.0, row(at.position, i + 1), -1.0, row(at.position, i))
         before = combine(1.0, row(stage.origin_position, i + 1), -1.0, row(stage.origin_position, i))
@@ -253,6 +252,7 @@ def differentiate_turns(p, maps, start, guess, at, stage):
                 crossed = _skew(t, c, d)
                 across = (_skew(lengthened, c, d) - cross(lengthened, t)[c] * t[d]) / length
                 of_end[c, d] = size * (crossed - across) - 2.0 * size * around[c] * t[d] / length + ahead * crossed
+                of_end[c, d] += factor * around[c] * way[2, e, d]
                 of_origin[c, d] = -size * crossed
             of_end[c, 3] = factor * around[c]
             of_origin[c, 3] = -factor * around[c]
@@ -263,7 +263,6 @@ def differentiate_turns(p, maps, start, guess, at, stage):
             spin += fluid.mass[e, 2] / stage.momentum_length
         maps.by_turn[e] = spin / h
         _add_turned(strands, strands.edge_unknown[e], e, maps.by_turn[e], way[2], maps.lacking)
-    _add_turns(strands, maps)
     return READY
 
 

@@ -29,7 +29,7 @@ from bilayer_core.engine.body_maps import (
     turn_origin,
     turn_origin_back,
 )
-from bilayer_core.engine.linear.krylov_solution import Lack, gather, solve_with_lack, spread
+from bilayer_core.engine.linear.krylov_solution import ROUNDED, Lack, gather, solve_with_lack, spread
 from bilayer_core.engine.linear.lacking_matrix import LackingMatrix, multiply, unknown_of_edge
 from bilayer_core.engine.linear.newton_matrix import solve
 from bilayer_core.engine.stage_maps import StageMaps
@@ -39,9 +39,6 @@ from bilayer_core.kinematics.vector import row
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Method, Stage
-
-ROUNDED = 1e-13
-"""What may be left of solutions with what a Hessian lacks, of the whole."""
 
 
 @record

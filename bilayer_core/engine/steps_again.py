@@ -6,6 +6,9 @@ import math
 
 from bilayer_core.engine.actuation import Actuation, drive_step, take_first_stimuli
 from bilayer_core.engine.configuration import move, take_state
+from bilayer_core.engine.evaluate import evaluate_at
+from bilayer_core.engine.linear.krylov_solution import ROUNDED, Lack, solve_with_lack
+from bilayer_core.engine.linear.newton_matrix import factorise, solve
 from bilayer_core.engine.newton import first_guess_of
 from bilayer_core.engine.potential import (
     add_forces,
@@ -15,6 +18,7 @@ from bilayer_core.engine.potential import (
 )
 from bilayer_core.engine.stages import add_history_to_origin, predict_stage, set_origin, start_step_point
 from bilayer_core.engine.step import drive_stage
+from bilayer_core.forces.elements import start_elements
 from bilayer_core.forces.rod_contact import find_rod_contacts
 from bilayer_core.jit import kernel, piece, record
 from bilayer_core.jit.record import Matrix, Stack, Vector
@@ -77,20 +81,63 @@ def drive_steps(actuation, method, inputs, driven, first, last, ahead, same):
     return last
 
 
-@piece(int, Problem, StateArrays, Method, StageInputs, Work, int, float, Configuration, Configuration)
-def begin_stage(p, state, method, inputs, work, n, h, start, guess):
-    """Start stage n of it from the configuration where the last one ended, up to the first guess; return a status."""
-    stage = work.stage
+@piece(int, Problem, StateArrays, Method, StageInputs, Work, int, float, Configuration)
+def pass_stage(p, state, method, inputs, work, n, h, start):
+    """Freeze what inertia takes stage n of it to, from the configuration where the last one ended."""
     set_origin(work, method, n)
     drive_stage(p, state, inputs, n, work)
     if method.history:
         add_history_to_origin(p, state, work, method, n, h)
     predict_stage(p, state, work, inputs, n, work.first if n == 0 else work.end, start)
+    return READY
+
+
+@piece(int, Problem, StateArrays, Method, StageInputs, Work, int, float, Configuration, Configuration)
+def begin_stage(p, state, method, inputs, work, n, h, start, guess):
+    """Start stage n of it from the configuration where the last one ended, up to the first guess; return a status."""
+    stage = work.stage
+    pass_stage(p, state, method, inputs, work, n, h, start)
     status = start_stage(p, start, stage)
     if status != READY:
         return status
     update_lagged(p, start, stage)
     return first_guess_of(p, start, inputs.position[n], inputs.rotation[n], stage, guess, False)
+
+
+@piece(int, Problem, Configuration, Stage)
+def factorise_end(p, at, stage):
+    """Factorise the Hessian of all forces at a configuration, whose gradient is left in `Sums`; return a status."""
+    p.sums.selected[:] = True
+    start_elements(0, p, at, stage)
+    status = evaluate_at(p, at, stage, True, True)
+    return factorise(p, at, stage, False) if status == READY else status
+
+
+@piece(float, Problem, Configuration, Lack, bool, float)
+def correct(p, at, lack, lacks, radius):
+    """Write Newton's correction from the present gradient to `System.step`; return the largest displacement in it [m],
+    with a radius for turns.
+    """
+    strands, system = p.strands, p.system
+    if lacks:
+        solve_with_lack(p, at, lack, ROUNDED, False)
+        for j in range(system.step.shape[0]):
+            system.step[j] = -system.step[j]
+        for f in range(system.body_step.shape[0]):
+            for c in range(6):
+                system.body_step[f, c] = -system.body_step[f, c]
+    else:
+        solve(p)
+    largest = 0.0
+    for i in range(strands.node_unknown.shape[0]):
+        for c in range(3):
+            largest = max(largest, abs(system.step[strands.node_unknown[i] + c]))
+    for e in range(strands.edge_unknown.shape[0]):
+        largest = max(largest, radius * abs(system.step[strands.edge_unknown[e]]))
+    for f in range(system.body_step.shape[0]):
+        for c in range(6):
+            largest = max(largest, (1.0 if c < 3 else radius) * abs(system.body_step[f, c]))
+    return largest
 
 
 @kernel

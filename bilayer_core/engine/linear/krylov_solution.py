@@ -12,6 +12,9 @@ from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration
 
+ROUNDED = 1e-13
+"""What may be left of a solution, of the whole."""
+
 
 @record
 class Lack:

@@ -3,8 +3,8 @@
 In Newton's method they hold fixed what they took from the configuration, and the Hessian knows nothing of that. A stage
 ends where what they took is that of the end. So its matrix lacks ∂g/∂z ∂z/∂q, with z what they take, and its gradient
 depends on the origin of the stage by velocities. Drag and friction on surfaces are differentiated element by element
-(`engine.stage_maps`, `engine.friction_differences`). Of other forces both are differences of the gradient: unknowns that
-no row sees together change at once, and those of rods that touch one by one.
+(`engine.stage_maps`, `engine.friction_differences`). Of other forces both are differences of the gradient: unknowns
+that no row sees together change at once, and those of rods that touch one by one.
 """
 
 from __future__ import annotations

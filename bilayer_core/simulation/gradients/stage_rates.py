@@ -285,8 +285,8 @@ class StageDerivatives:
         if self._resisted:
             found.elastic.resistance[:] = resistances(again)
         while self.constants.in_space:
+            differentiate_turns(again.problem, again.maps, again.places[n], again.guesses[n], at, stage, again.lacks)
             again.lacks = True
-            differentiate_turns(again.problem, again.maps, again.places[n], again.guesses[n], at, stage)
             if not again.overfull:
                 break
             self.follower.write(again, n)

@@ -12,15 +12,24 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bilayer_core.engine.body_maps import BodyMaps, write_body_maps
+from bilayer_core.engine.configuration import move
 from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.engine.gradient_differences import StrainDifferences, differentiate_by_laws, differentiate_by_strains
-from bilayer_core.engine.linear.krylov_solution import Lack, solve_with_lack
+from bilayer_core.engine.linear.krylov_solution import Lack
 from bilayer_core.engine.linear.lacking_matrix import LackingMatrix
-from bilayer_core.engine.linear.newton_matrix import solve
 from bilayer_core.engine.stage_maps import StageMaps
 from bilayer_core.engine.step_ends import end_stage
-from bilayer_core.engine.step_response import ROUNDED
-from bilayer_core.engine.steps_again import Reached, begin_stage, begin_step, expect_end, follow, go_to
+from bilayer_core.engine.steps_again import (
+    Reached,
+    begin_stage,
+    begin_step,
+    correct,
+    expect_end,
+    factorise_end,
+    follow,
+    go_to,
+    pass_stage,
+)
 from bilayer_core.errors import SimulationError
 from bilayer_core.model.force_slots import NAMES
 from bilayer_core.model.model import Model
@@ -292,6 +301,13 @@ class StepAgain(Evaluator):
     def _no_bodies(self) -> Array:
         return np.zeros_like(self.problem.system.body_step)
 
+    def pass_through(self, n: int, end: Configuration) -> None:
+        """Go through stage n, of which only the end counts."""
+        step = self._step
+        pass_stage(self.problem, self._arrays, step.method, self._inputs, self._work, n, step.length, self.places[n])
+        self.places[n + 1] = end
+        self.finish(n)
+
     def finish(self, n: int) -> None:
         """Take the end of stage n."""
         at, work = self.places[n + 1], self._work
@@ -320,24 +336,16 @@ class StepAgain(Evaluator):
         self.lacks = written = False
         for k in range(MOST):
             at = self.places[n + 1]
-            self.evaluate(at, second=True)
-            gradient = self.whole_gradient()
-            shift, simplified = self.factorise(at)
-            if shift or simplified:
-                raise SimulationError("gradient: a step ends where the shape is unstable", self._step.begin)
+            self._factorise_end(at)
             if k and self._settles:
+                gradient = self.sums.gradient.copy(), self.sums.body.copy()
                 write_maps(self, n)
                 written = True
-            travel = -self._solved(n, gradient)
-            moved = np.abs(travel[self.of_nodes]).max()
-            turned = (
-                np.abs(travel[self.of_edges]).max(initial=0.0),
-                np.abs(travel[self.of_bodies[:, 3:]]).max(initial=0.0),
-            )
-            moved = max(moved, self._size * max(turned), np.abs(travel[self.of_bodies[:, :3]]).max(initial=0.0))
+                self.sums.gradient[:], self.sums.body[:] = gradient
+            moved = correct(self.problem, at, self.lack, self.lacks, self._size)
             if not moved > max(ENOUGH * self._size, self._tolerance * self.stage.length):
                 break
-            self.travel(at, travel, self.spare)
+            move(self.problem, at, 1.0, self.stage, self.spare)
             self.places[n + 1], self.spare = self.spare, at
             self.follow(self.places[n + 1])
         if not written:
@@ -345,18 +353,16 @@ class StepAgain(Evaluator):
         at = self.places[n + 1]
         reached.position[:], reached.turn[:] = at.position, at.total_angle - self.guesses[n].total_angle
         reached.body_position[:], reached.body_rotation[:] = at.body_position, at.body_rotation
-        return reached, float(moved)
+        return reached, moved
 
-    def _solved(self, n: int, right: Array) -> Array:
-        """Return the inverse of the factorised Hessian, where stage n ended, and what it lacks, times a vector."""
-        problem, sums = self.problem, self.sums
-        sums.gradient[:], sums.body[:] = right[: self._rods], right[self._rods :].reshape(-1, 6)
-        if self.lacks:
-            solve_with_lack(problem, self.places[n + 1], self.lack, ROUNDED, False)
-        else:
-            solve(problem)
-        found = np.concatenate([problem.system.step, problem.system.body_step.ravel()])
-        return found if self.lacks else -found
+    def _factorise_end(self, at: Configuration) -> None:
+        """Factorise the Hessian at a configuration, and leave the gradient there."""
+        while (status := factorise_end(self.problem, at, self.stage)) != READY:
+            self._grow(status)
+        outcome = self._storage.outcome
+        self.gap = outcome.gap
+        if outcome.shift or outcome.simplified:
+            raise SimulationError("gradient: a step ends where the shape is unstable", self._step.begin)
 
     def write_body_maps(self, n: int, maps: BodyMaps) -> None:
         """Write the maps of free bodies in stage n."""

@@ -128,9 +128,7 @@ class StepRates:
         for n, again in enumerate(self._agains[: self._count]):
             again.begin(step)
             for earlier in range(n):
-                again.start(earlier)
-                again.go(earlier, reached[earlier])
-                again.finish(earlier)
+                again.pass_through(earlier, self._agains[earlier].places[earlier + 1])
             again.start(n)
             if n == 0:
                 self._of.write_start(again, step)
