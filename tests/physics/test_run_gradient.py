@@ -42,7 +42,7 @@ STILL_WATER, BODY = {"fluid.added_mass": False}, "rods.body.layers.active"
 JET = {"name": "jet", "rod": "strip", "position": 0.1, "force": [0, 0.01, 0.02], "frame": "material"}
 MOVES = {"bodies.wall.motion": {"type": "prescribed", "times": [0, 0.1], "displacements": [[0, 0, 0], [0, 0, 0.01]]}}
 EULER = {"solver.integrator": "implicit_euler", "solver.dt": 0.004, "solver.tolerance": None}
-ALPHA = {"solver.integrator": "generalised_alpha"}
+ALPHA, MIDPOINT = {"solver.integrator": "generalised_alpha"}, {"solver.integrator": "implicit_midpoint"}
 UNLIKE = {"solver.integrator": "tr_bdf2", THICKNESS: 1.5e-4}
 VISCOUS, SPACE = {VISCOSITY: 0.05}, {"solver.dimension": 3}
 HEAVY = {"fluid.added_mass": True}
@@ -76,6 +76,7 @@ RING = SWELLS | SPACE | {"gravity": [1.0, 0.5, -9.81]}
 DRIES = {"materials.tissue.retardation_time": 0.01, "rods.valve.layers.outer.interval": [0, 0.06]}
 OF_TIP = {"drag": {"coefficient": 0.5, "area": 1e-3}}
 DRAGGED = {"bodies": [WALL, AT_TIP["bodies"][1] | OF_TIP], "fluid": WATER | {"added_mass": True}}
+SPUN = HANGING | SPACE | MIDPOINT | {"bodies.wall.motion": SPINNING, LAG: 0.05}
 RESTS = {"start": "settle", "stimuli.swelling.schedule.from": 0.3}
 CASES = {
     "in a plane": ("bending", HANGING, 0.2, [GAIN, LEVEL, TIME, MODULUS, THICKNESS, "gravity.2", LENGTH]),
@@ -110,6 +111,7 @@ CASES = {
         0.03,
         [GAIN, LENGTH, "bodies.wall.motion.inertia.1"],
     ),
+    "the implicit midpoint rule": ("bending", SPUN, 0.03, [GAIN, LAG, LENGTH, "bodies.wall.motion.inertia.1"]),
     "a moment": ("bending", AT_TIP | {"loads": [TWIST]}, 0.03, [GAIN, "loads.0.moment.1"]),
     "a body in water": ("bending", AT_TIP | DRAGGED, 0.02, [GAIN, "fluid.density"]),
     "a viscous strip on a body": ("bending", AT_TIP | VISCOUS, 0.03, [GAIN, LENGTH, VISCOSITY]),
@@ -209,6 +211,7 @@ BACK = {
     "a hinge that rubs": ("bending", bob(HINGE), 0.05, [GAIN, f"{TURNED}.friction"]),
     "a body that turns": ("bending", HANGING | TURNING, 0.05, [GAIN, "gravity.2"]),
     "a body with a history": ("bending", HANGING | TURNING | {"solver.integrator": "tr_bdf2"}, 0.01, [GAIN]),
+    "the implicit midpoint rule": ("bending", SPUN, 0.02, [GAIN, LEVEL, LENGTH]),
     "a body in water": ("bending", AT_TIP | DRAGGED, 0.01, ["fluid.density"]),
     "a viscous strip of fibres": ("chiral_pod", DRIES, 0.01, ["gravity.2"]),
     "added mass": ("flagellum", {}, 0.05, ["fluid.density"]),
@@ -332,7 +335,7 @@ def test_a_run_that_begins_elsewhere_begins_there_whatever_the_numbers_are():
     [
         ("ring", {}, "gravity.2", "light"),
         ("six_finger_gripper", {}, "gravity.2", "restitution"),
-        ("bending", {"solver.integrator": "implicit_midpoint"}, GAIN, "end beyond their last stage"),
+        ("bending", IN_WATER | HEAVY | MIDPOINT, "fluid.density", "end beyond their last stage"),
         ("bending", {"bodies.wall.motion": SPINNING, "start": "settle"}, GAIN, "settles and then moves"),
         ("bending", {}, "swelling", "a number of its schedule"),
         ("bending", {}, "contact.stiffness", "contact"),

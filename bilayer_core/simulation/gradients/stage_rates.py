@@ -21,12 +21,12 @@ from bilayer_core.engine.gradient_differences import StrainDifferences
 from bilayer_core.forces.body_drag import body_flow_of
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration
-from bilayer_core.scene.transduction import lagged
 from bilayer_core.simulation.gradients.body_rates import BodyRates, drag_by_origin
 from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.followed import FOLLOWING, Followed
 from bilayer_core.simulation.gradients.mechanism_rates import resistances, slopes_of_motions
 from bilayer_core.simulation.gradients.step_again import KeptStep, Lacking, StepAgain, cross_matrices
+from bilayer_core.simulation.gradients.transduction_rates import TransductionRates
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -92,8 +92,6 @@ class Constants:
         columns = drives.field_first[drives.law_field[rows]] + within
         self.followed = np.zeros((len(drives.law_gain), again.transduction.size))
         np.add.at(self.followed, (rows, columns), drives.law_weight[: len(rows)])
-        counts = np.diff(drives.field_first)
-        self.channel = np.repeat(drives.field_channel, counts)
         self.raised_rows = problem.raised.first + 3 * problem.raised.slot[:, None] + np.arange(3)
 
     def _masses(self, again: StepAgain) -> tuple[Array, Entries]:
@@ -286,7 +284,16 @@ class StageRates:
     way: tuple[Array, ...] = ()  # of turns, by places at the start, at the first guess and at the end
     law_by_mode: Array = field(default_factory=lambda: np.zeros((0, 0)))
     law_by_gain: Array = field(default_factory=lambda: np.zeros(0))
-    lag: Array = field(default_factory=lambda: np.zeros((3, 0)))  # ∂T/∂(T at the start, first, stimulus)
+    transduction: TransductionRates | None = None
+
+
+@dataclass
+class EndRates:
+    """Linear maps of the end of a step beyond its last stage, with names as in `StageRates`."""
+
+    transduction: TransductionRates
+    bodies: BodyRates | None
+    way: tuple[Array, ...]  # of turns, by places at the last stage and at the end
 
 
 class StageDerivatives:
@@ -345,8 +352,17 @@ class StageDerivatives:
             slope = 1.0 - (laws / drives.law_saturation) ** 2
             found.law_by_mode = (slope * drives.law_gain)[:, None] * constants.followed
             found.law_by_gain = slope * (constants.followed @ again.transduction - drives.law_reference)
-        found.lag = self._lag(again, n, step)
+        found.transduction = TransductionRates(again, n, step)
         return found
+
+    def beyond(self, again: StepAgain, n: int, step: KeptStep) -> EndRates:
+        """Return the maps of the end of a step beyond its last stage, its point n."""
+        at, bodies, way = again.places[n + 1], None, ()
+        if again.of_bodies.size:
+            bodies = BodyRates(again, at, step.method.couplings[n, :n], again.turned[:n])
+        if self.constants.in_space:
+            way = _holonomy(len(self.constants.spin_inertia), again.places[n], at)
+        return EndRates(TransductionRates(again, n, step), bodies, way)
 
     def _by_laws(self, again: StepAgain, at: Configuration) -> Array:
         """Return ∂g/∂η, shape (size, n_law)."""
@@ -407,19 +423,6 @@ class StageDerivatives:
             by_place = by_place + found.lacking + Entries(np.repeat(row, 6), column, value, by_place.shape)
             by_origin = by_origin + found.by_origin
         found.lacking, found.by_origin = by_place, by_origin
-
-    def _lag(self, again: StepAgain, n: int, step: KeptStep) -> Array:
-        """Return what each mode takes of what it had reached, of the first stimulus and of that of the stage."""
-        drives, inputs, state = again.problem.drives, again.inputs, step.start
-        found = np.zeros((3, len(self.constants.channel)))
-        for m, channel in enumerate(self.constants.channel):
-            own = state.transduction[m], inputs.first[channel], inputs.stimulus[n, channel]
-            lags = float(drives.mode_rising[m]), float(drives.mode_falling[m])
-            lag = lags[0] if own[2] > own[0] else lags[1]  # on either side of it
-            for k in range(3):
-                unit = [float(j == k) for j in range(3)]
-                found[k, m] = lagged(*unit, lag, lag, float(inputs.elapsed[n]))
-        return found
 
 
 def _holonomy(edges: int, first: Configuration, second: Configuration) -> tuple[Array, Array]:

@@ -16,6 +16,7 @@ from bilayer_core.engine.evaluator import Evaluator
 from bilayer_core.engine.gradient_differences import StrainDifferences, differentiate_by_laws, differentiate_by_strains
 from bilayer_core.engine.linear.krylov_solution import Lack, solve_with_lack
 from bilayer_core.engine.linear.newton_matrix import solve
+from bilayer_core.engine.step import move_beyond
 from bilayer_core.engine.step_ends import end_stage
 from bilayer_core.engine.steps_again import Reached, begin_stage, begin_step, expect_end, follow, go_to
 from bilayer_core.errors import SimulationError
@@ -71,6 +72,12 @@ class KeptStep:
         """Duration [s]."""
         return float(self.end.time[0]) - self.begin
 
+    @property
+    def beyond(self) -> bool:
+        """Whether it ends beyond its last stage."""
+        points, stages = self.method.couplings.shape
+        return points > stages
+
 
 class StepAgain(Evaluator):
     """Makes kept steps again.
@@ -85,7 +92,7 @@ class StepAgain(Evaluator):
     same : float
         Two times that differ by no more are one [s].
     stages : int
-        Of a step, at most.
+        Of a step, at most, its end counted where that is beyond the last one.
     history : bool
         Whether the integrator keeps stage derivatives.
     tolerance : float
@@ -94,11 +101,13 @@ class StepAgain(Evaluator):
     Attributes
     ----------
     places : list of Configuration
-        The start of the step, then the end of each stage.
+        The start of the step, then the end of each stage, and of a step that ends beyond its last one.
     guesses : list of Configuration
         Where Newton's method began in each stage.
     reached : Reached
         Where the stage ended that was found last.
+    ended : Point
+        The end of the last stage, or of the step where that is beyond it.
     size, wet : int
         Of unknowns, and of the fluid's momentum in their places.
     """
@@ -133,6 +142,7 @@ class StepAgain(Evaluator):
         self._tolerance = tolerance
         self._settles = not {"friction", "rod friction"}.isdisjoint(model.forces)
         self._lack: Lack | None = None
+        self.ended = self._work.end
         self._elastic = [name for name in ELASTIC if name in model.forces]
         layout = self.problem.strands
         self.of_nodes = layout.node_unknown[:, None] + np.arange(3)
@@ -169,7 +179,7 @@ class StepAgain(Evaluator):
     @property
     def end_rates(self) -> Array:
         """Rates of strains at the end of the stage, shape (n_strain,)."""
-        return self._work.end.strain_rate
+        return self.ended.strain_rate
 
     @property
     def held(self) -> Array:
@@ -180,16 +190,16 @@ class StepAgain(Evaluator):
     @property
     def speeds_of_held(self) -> Array:
         """Velocities of these at the end of the stage, and what they gain by its length, shape (2, n_held, 3)."""
-        constrained, work = self.problem.constrained, self._work
-        gained = (work.end.velocity - work.origin.velocity) / self.stage.momentum_length
-        return np.stack([work.end.velocity, gained])[:, constrained.node[constrained.free >= 0]]
+        constrained, velocity = self.problem.constrained, self.ended.velocity
+        gained = (velocity - self.point.velocity) / self.stage.momentum_length
+        return np.stack([velocity, gained])[:, constrained.node[constrained.free >= 0]]
 
     @property
     def momenta_of_bodies(self) -> Array:
         """Angular momenta of free bodies at the end of the stage, and what they gain by its length, shape (2, n_free,
         3).
         """
-        end, origin = self._work.end.angular_momentum, self._work.origin.angular_momentum
+        end, origin = self.ended.angular_momentum, self.point.angular_momentum
         return np.stack([end, (end - origin) / self.stage.momentum_length])
 
     @property
@@ -197,13 +207,13 @@ class StepAgain(Evaluator):
         """Gain of the fluid's momentum over the stage, shape (wet,)."""
         gained = np.zeros(self.wet)
         if self.wet:
-            gained[self.of_nodes] = self._work.end.fluid_momentum - self._work.origin.fluid_momentum
+            gained[self.of_nodes] = self.ended.fluid_momentum - self.point.fluid_momentum
         return gained
 
     @property
     def origin_rates(self) -> Array:
         """Rates of strains at its origin, likewise."""
-        return self._work.origin.strain_rate
+        return self.point.strain_rate
 
     def start(self, n: int) -> None:
         """Start stage n, up to the first guess."""
@@ -248,6 +258,15 @@ class StepAgain(Evaluator):
         end_stage(self.problem, self._arrays, work, self._inputs, n, at)
         work.start_angle[:] = work.end.angle
         at.total_angle[:] = 0.0
+        self.ended = work.end
+
+    def go_beyond(self, n: int) -> None:
+        """Go from the end of the last stage to that of the step, its point n."""
+        step, places = self._step, (self.places[n], self.places[n + 1])
+        status = move_beyond(self.problem, self._arrays, step.method, self._inputs, self._work, n, *places)
+        if status != READY:
+            raise SimulationError("gradient: a step that was made is not possible once more", step.begin)
+        self.ended = self.point
 
     def gradient(self, n: int) -> Array:
         """Return the gradient of the potential where stage n ended, shape (size,)."""

@@ -22,7 +22,7 @@ import numpy as np
 
 from bilayer_core.engine.steps_again import Reached
 from bilayer_core.model.model import Model
-from bilayer_core.simulation.gradients.stage_rates import StageDerivatives
+from bilayer_core.simulation.gradients.stage_rates import EndRates, StageDerivatives
 from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
 
 Array = np.ndarray
@@ -99,13 +99,14 @@ class StepRates:
     def __init__(self, model: Model, agains: Sequence[StepAgain]):
         self._agains = agains
         self._of = StageDerivatives(model, agains[0])
+        self._end: EndRates | None = None
         self.constants = self._of.constants
         self.residual = 0.0
 
     def take(self, step: KeptStep) -> list[Reached]:
         """Go to a step; return where its stages ended."""
         self.step, self._stages, reached = step, [], []
-        stages = len(step.method.couplings)
+        stages = step.method.couplings.shape[1]
         for n, again in enumerate(self._agains[:stages]):
             again.begin(step)
             for earlier in range(n):
@@ -121,6 +122,17 @@ class StepRates:
             reached.append(place)
             self.residual = max(self.residual, correction / step.length)
             self._stages.append(self._of.of(again, n, step, followed))
+        self.ended, self._end = reached[-1].position, None
+        if step.beyond:
+            again = self._agains[stages]
+            again.begin(step)
+            for n, place in enumerate(reached):
+                again.start(n)
+                again.go(n, place)
+                again.finish(n)
+            again.go_beyond(stages)
+            self.ended = again.places[stages + 1].position
+            self._end = self._of.beyond(again, stages, step)
         return reached
 
     @property
@@ -171,10 +183,7 @@ class StepRates:
                 if method.history:
                     bodies.turn_by_history(first, speed, push, origin)
                 ahead = bodies.predict(origin, origin_speed)
-            reached = stage.lag[0][:, None] * start.reached
-            if len(constants.channel):
-                reached += stage.lag[1][:, None] * acts.first[constants.channel]
-                reached += stage.lag[2][:, None] * acts.stimulus[n, constants.channel]
+            reached = stage.transduction.forward(start, acts)
             of_mass = constants.masses(origin)
             change = -(of_mass + stage.length * constants.masses(origin_speed)) / stage.momentum_length
             change = (change - constants.dissipation(origin, of_mass)) / stage.length
@@ -216,10 +225,42 @@ class StepRates:
                 end_speed[fluid] = stage.momentum[0] @ moved + stage.momentum[1] @ end_speed[:size]
             gained.append((end - origin, end_speed - origin_speed))
             place, turn = moved, end[edges]
+        if self._end:
+            found = self._beyond(self._end, (first, speed), (place, turn), gained, turned)
+            found.reached = self._end.transduction.forward(start, acts)
+            return found
         kept = (end_speed - origin_speed) / stage.momentum_length
         kept = (kept - method.carry * push) / (1.0 - method.carry)
         kept[self._forgotten] = 0.0
         return Rates(place, end_speed[:size], end_speed[constants.of_strains], reached, kept[:size], kept[size:])
+
+    def _beyond(
+        self,
+        end: EndRates,
+        start: Sequence[Array],
+        last: tuple[Array, Array],
+        gained: Sequence[tuple[Array, Array]],
+        turned: Sequence[tuple[Array, Array]],
+    ) -> Rates:
+        """Return how the end of a step changes beyond its last stage: `start` has rates of its start, and `last` those
+        of places and turns at the last stage.
+        """
+        constants, edges, couplings = self.constants, self._agains[0].of_edges, self.step.method.couplings[-1]
+        place, end_speed = start[0].copy(), start[1].copy()
+        for coupling, (of_place, of_speed) in zip(couplings, gained, strict=True):
+            place += coupling * of_place
+            end_speed += coupling * of_speed
+        if end.bodies:
+            end.bodies.turn_origin(start[0], place, turned)
+        angle, place = place[edges], place[: constants.size]
+        place = end.bodies.spread(place) if end.bodies else constants.free * place
+        if end.way:
+            before = last[1] - last[0][edges] + constants.along(end.way[0], last[0])
+            place[edges] = angle - before - constants.along(end.way[1], place)
+        found = Rates.zeros(self._agains[0], place.shape[1])
+        found.place, found.speed = place, end_speed[: constants.size]
+        found.strain_rate = end_speed[constants.of_strains]
+        return found
 
     # backward
 
@@ -230,7 +271,7 @@ class StepRates:
         constants, method, h = self.constants, self.step.method, self.step.length
         size, edges, columns = constants.size, self._agains[0].of_edges, end.place.shape[1]
         start = Rates.zeros(self._agains[0], columns)
-        acts = Inputs.zeros(self._agains[0], len(self._stages), columns)
+        acts = Inputs.zeros(self._agains[0], len(method.couplings), columns)
         push, fluid = np.zeros((constants.whole, columns)), constants.of_fluid
         first, speed = np.zeros_like(push), np.zeros_like(push)
         count = len(self._stages)
@@ -240,14 +281,18 @@ class StepRates:
         origin_speeds = [np.zeros_like(push) for _ in range(count)]
         places = [np.zeros((size, columns)) for _ in range(count)]
         direct: list[Array] = [np.zeros((size, columns))] * count
-        places[-1] += end.place
-        kept = np.concatenate([end.push, end.strain_push]) / (1.0 - method.carry)
-        kept[self._forgotten] = 0.0
-        push -= method.carry * kept
-        end_speeds[-1] += kept / self._stages[-1].momentum_length
-        end_speeds[-1][:size] += end.speed
-        end_speeds[-1][constants.of_strains] += end.strain_rate
-        origin_speeds[-1] -= kept / self._stages[-1].momentum_length
+        if beyond := self._end:
+            beyond.transduction.backward(end.reached, start, acts)
+            self._beyond_back(beyond, end, (first, speed, places[-1]), (ends, end_speeds, origins, origin_speeds))
+        else:
+            places[-1] += end.place
+            kept = np.concatenate([end.push, end.strain_push]) / (1.0 - method.carry)
+            kept[self._forgotten] = 0.0
+            push -= method.carry * kept
+            end_speeds[-1] += kept / self._stages[-1].momentum_length
+            end_speeds[-1][:size] += end.speed
+            end_speeds[-1][constants.of_strains] += end.strain_rate
+            origin_speeds[-1] -= kept / self._stages[-1].momentum_length
         for n in reversed(range(count)):
             stage = self._stages[n]
             of_momentum = end_speeds[n][fluid].copy()
@@ -279,15 +324,12 @@ class StepRates:
             origins[n] -= of_mass + drag
             origins[n][constants.of_strains] -= stage.resistance * change[constants.of_strains] / stage.length
             origin_speeds[n] -= stage.length * of_mass
-            reached = end.reached if n + 1 == count else np.zeros_like(end.reached)
+            reached = np.zeros_like(end.reached) if n + 1 < count or beyond else end.reached
             if len(stage.law_by_gain):
                 laws = stage.by_laws.T @ right
                 reached = reached + stage.law_by_mode.T @ laws
                 acts.gain += stage.law_by_gain[:, None] * laws
-            start.reached += stage.lag[0][:, None] * reached
-            if len(constants.channel):
-                np.add.at(acts.first, constants.channel, stage.lag[1][:, None] * reached)
-                np.add.at(acts.stimulus[n], constants.channel, stage.lag[2][:, None] * reached)
+            stage.transduction.backward(reached, start, acts)
             if stage.by_origin is not None:
                 origins[n][:size] += stage.by_origin.T @ spread
             if stage.by_director is not None:
@@ -333,3 +375,30 @@ class StepRates:
         start.strain_rate += speed[constants.of_strains]
         start.push, start.strain_push = push[:size], push[size:]
         return start, acts, direct
+
+    def _beyond_back(self, beyond: EndRates, end: Rates, start: Sequence[Array], stages: Sequence[list[Array]]) -> None:
+        """Take derivatives by the end of a step beyond its last stage: `start` has those by its start and by places at
+        the last stage, `stages` those by ends and origins of all stages.
+        """
+        constants, edges = self.constants, self._agains[0].of_edges
+        first, speed, last = start
+        ends, end_speeds, origins, origin_speeds = stages
+        by_place, by_speed = np.zeros_like(first), np.zeros_like(speed)
+        by_speed[: constants.size], by_speed[constants.of_strains] = end.speed, end.strain_rate
+        place = end.place.copy()
+        if beyond.way:
+            turns = place[edges]
+            place -= constants.along_back(beyond.way[1], turns)
+            last -= constants.along_back(beyond.way[0], turns)
+            last[edges] += turns
+            ends[-1][edges] -= turns
+        by_place[: constants.size] = beyond.bodies.gather(place) if beyond.bodies else constants.free * place
+        if beyond.bodies:
+            beyond.bodies.turn_origin_back(first, by_place, ends, origins)
+        first += by_place
+        speed += by_speed
+        for j, coupling in enumerate(self.step.method.couplings[-1]):
+            ends[j] += coupling * by_place
+            origins[j] -= coupling * by_place
+            end_speeds[j] += coupling * by_speed
+            origin_speeds[j] -= coupling * by_speed

@@ -357,6 +357,8 @@ class VariedNumbers:
             again.go(n, place)
             gradients.append(again.gradient(n))
             again.finish(n)
+        if step.beyond:
+            again.go_beyond(len(reached))
         carry = step.method.carry
         push = (again.end_rates - again.origin_rates) / again.stage.momentum_length
         of_fluid = again.gained_momentum / (again.stage.momentum_length * (1.0 - carry))

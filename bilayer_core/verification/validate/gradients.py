@@ -169,6 +169,7 @@ RUNS: dict[str, tuple[Any, ...]] = {
     "modulus, two rods": ("bending", SWELLING | TWO_RODS, 0.1, "materials.active.youngs_modulus"),
     "thickness": ("bending", SWELLING, 0.2, f"{ACTIVE}.thickness"),
     "length, implicit euler": ("bending", SWELLING | EULER, 0.1, "rods.strip.path.length", "com", 1e-5),
+    "gain, implicit midpoint": ("bending", SWELLING | {"solver.integrator": "implicit_midpoint"}, 0.1, GAIN),
     "viscosity": ("bending", SWELLING | VISCOUS, 0.2, "materials.active.retardation_time"),
     "hinges/density": ("arch", {}, 0.005, "materials.passive.density"),
     "starts at rest/gain": ("bending", SWELLING | {"start": "settle"}, 0.05, GAIN),
