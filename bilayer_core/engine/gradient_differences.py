@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bilayer_core.contact.gap import gap_normal
 from bilayer_core.engine.configuration import move
 from bilayer_core.engine.laws import grow
 from bilayer_core.engine.linear.assembly import expand_gradient
@@ -17,7 +18,7 @@ from bilayer_core.forces.friction_change import FrozenChange, add_changed_fricti
 from bilayer_core.forces.rod_contact import find_rod_contacts
 from bilayer_core.forces.surface_friction import freeze_surface_contacts
 from bilayer_core.jit import kernel, piece, record
-from bilayer_core.jit.record import Flags, Indices, Matrix
+from bilayer_core.jit.record import Flags, Indices, Matrix, Vector
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Stage, Work
@@ -54,6 +55,14 @@ class StrainDifferences:
     by_law: Matrix  # shape (n_law, size)
     colour: Indices  # of strains, −1 for those that stay
     by_strain: Matrix  # a row for each colour
+
+
+@record
+class Gaps:
+    """Gaps of pairs whose impacts are damped."""
+
+    gap: Vector  # [m]
+    normal: Matrix
 
 
 @kernel
@@ -264,6 +273,18 @@ def differentiate_momentum(p, differences, at, trial, stage, h):
             for i in range(p.strands.node_unknown.shape[0]):
                 for c in range(3):
                     rows[row, p.strands.node_unknown[i] + c] += side / (2.0 * h) * p.fluid.momentum[i, c]
+    return READY
+
+
+@piece(int, Problem, Configuration, Gaps)
+def write_gaps(p, at, out):
+    """Write the gaps of pairs whose impacts are damped."""
+    pairs, x = p.restitution, at.contact_point
+    for k in range(out.gap.shape[0]):
+        i, s = pairs.point[k], pairs.surface[k]
+        found = gap_normal(p.surfaces, at, p.surfaces.radius[i], s, x[i, 0], x[i, 1], x[i, 2])
+        out.gap[k] = found[0]
+        out.normal[k, 0], out.normal[k, 1], out.normal[k, 2] = found[1], found[2], found[3]
     return READY
 
 

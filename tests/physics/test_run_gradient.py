@@ -69,6 +69,14 @@ TURNED = "joints.pivot.turning"
 SPINNING = dict(FREE, inertia=[3e-8, 5e-8, 7e-8], angular_velocity=[3.0, 5.0, -4.0])
 AT_TIP = bob({"type": "pin"}) | {"joints": []}
 """A body at the end of the strip."""
+FLOOR = {"name": "floor", "type": "plane", "point": [0, 0, -0.0056], "normal": [0, 0, 1]}
+DAMPED = {"barrier_distance": 2e-4, "stiffness": "10 MPa", "restitution": 0.5}
+LANDS = AT_TIP | {
+    "bodies": [WALL, AT_TIP["bodies"][1] | {"surface": {"shape": "sphere", "radius": 0.005}}],
+    "gravity": [0, 0, -50.0],
+    "obstacles": [FLOOR],
+    "contact": DAMPED,
+}
 TWIST = {"name": "twist", "body": "tip", "moment": [0.0005, 0.002, 0.001], "frame": "material"}
 LIT = {"stimuli.sun.light": None, "stimuli.sun.schedule.start": 0, "stimuli.sun.schedule.end": 0.05}
 SWELLS = LIT | {"rods.ring.layers.outer.eigenstrain": {"stimulus": "sun", "gain": 0.01}}
@@ -113,6 +121,7 @@ CASES = {
     ),
     "the implicit midpoint rule": ("bending", SPUN, 0.03, [GAIN, LAG, LENGTH, "bodies.wall.motion.inertia.1"]),
     "a moment": ("bending", AT_TIP | {"loads": [TWIST]}, 0.03, [GAIN, "loads.0.moment.1"]),
+    "a body that rebounds": ("bending", LANDS, 0.012, ["contact.restitution", "gravity.2"]),
     "a body in water": ("bending", AT_TIP | DRAGGED, 0.02, [GAIN, "fluid.density"]),
     "a viscous strip on a body": ("bending", AT_TIP | VISCOUS, 0.03, [GAIN, LENGTH, VISCOSITY]),
     "a viscous strip of fibres": ("chiral_pod", DRIES, 0.02, ["gravity.2", "materials.tissue.retardation_time"]),
@@ -132,7 +141,9 @@ ALIKE = STRIDE | STEPS_OF_1_MS | {"contact.friction": {"coefficient": 0.6, "spee
 GRIP = CLOSE | STEPS_OF_1_MS | {"stimuli.humidity.schedule.start": 0}
 BALL, FOOT, COEFFICIENT = "body/ball/position", "rod/hind_foot/position", "contact.friction.coefficient"
 GAIN_OF_ARMS, GAIN_OF_TRUNK = (f"rods.{rod}.layers.active.eigenstrain.gain" for rod in ("arm", "trunk"))
+SLIPS = LANDS | {"contact": DAMPED | {"friction": {"coefficient": 0.3, "speed_threshold": 0.01}}}
 RUBBING = {
+    "a body that rebounds": ("bending", SLIPS, 0.012, ["contact.restitution", GAIN], "body/tip/position"),
     "a crawler": ("crawling_inchworm", {}, 0.05, [f"{BODY}.eigenstrain.gain", "contact.friction.forward"], "com"),
     "rods in space": ("knot", {}, 0.005, ["materials.rubber.density"], "com"),
     "a jumper": ("jumping", {}, 0.03, ["gravity.2"], "com"),
@@ -209,6 +220,7 @@ BACK = {
     "friction on bodies": ("crawling_dual_leg", ALIKE, 0.002, ["gravity.2", COEFFICIENT]),
     "a grip": ("gripping", GRIP, 0.052, [COEFFICIENT, GAIN_OF_ARMS]),
     "a hinge that rubs": ("bending", bob(HINGE), 0.05, [GAIN, f"{TURNED}.friction"]),
+    "a body that rebounds": ("bending", SLIPS, 0.012, [GAIN, "contact.restitution"]),
     "a body that turns": ("bending", HANGING | TURNING, 0.05, [GAIN, "gravity.2"]),
     "a body with a history": ("bending", HANGING | TURNING | {"solver.integrator": "tr_bdf2"}, 0.01, [GAIN]),
     "the implicit midpoint rule": ("bending", SPUN, 0.02, [GAIN, LEVEL, LENGTH]),
@@ -334,7 +346,6 @@ def test_a_run_that_begins_elsewhere_begins_there_whatever_the_numbers_are():
     ("name", "overrides", "to", "told"),
     [
         ("ring", {}, "gravity.2", "light"),
-        ("six_finger_gripper", {}, "gravity.2", "restitution"),
         ("bending", IN_WATER | HEAVY | MIDPOINT, "fluid.density", "end beyond their last stage"),
         ("bending", {"bodies.wall.motion": SPINNING, "start": "settle"}, GAIN, "settles and then moves"),
         ("bending", {}, "swelling", "a number of its schedule"),

@@ -28,7 +28,7 @@ from bilayer_core.simulation.gradients.step_again import Lacking, StepAgain
 
 Array = np.ndarray
 FOLLOWING = ("drag", "turning drag", "added mass", "followers", "moments", "friction", "rod friction")
-PRESSING = ("barrier", "rod barrier")
+PRESSING = ("barrier", "rod barrier", "restitution")
 """On which friction depends."""
 REACH = 2
 """Nodes along a strand over which such a force at one depends on another: 1 for drag at the curve."""

@@ -47,6 +47,7 @@ DIFFERENTIATED = {
     "loads",
     "barrier",
     "rod barrier",
+    "restitution",
     "gyroscopic",
     "body drag",
     "joints",
@@ -56,7 +57,7 @@ DIFFERENTIATED = {
 """Forces through which runs are differentiated."""
 SEEDS = ("positions", "velocities")
 """By which a derivative comes back from the end of a run."""
-AT_END = ("speed", "push", "strain_rate", "reached", "strain_push")
+AT_END = ("speed", "push", "strain_rate", "reached", "strain_push", "kept")
 """Rates that a number changes by itself at the end of a step."""
 FORGETS = 1e6
 """Lengths of the rod by which a derivative by a number, times its size, moves it."""
@@ -288,6 +289,8 @@ class RunResponse:
         state.spin += way * along.speed[self._here.of_edges, k]
         if number.rates is None:
             state.strain_rate += way * along.strain_rate[:, k]
+        speeds = evaluator.speeds_of(state)
+        speeds += way * along.kept[:, k]
         state.transduction += way * along.reached[self._varied.modes(model), k]
         gains = model.drives.law_gain.copy()
         try:

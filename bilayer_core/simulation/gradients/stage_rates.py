@@ -24,6 +24,7 @@ from bilayer_core.model.records.step import Configuration
 from bilayer_core.simulation.gradients.body_rates import BodyRates, drag_by_origin
 from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.followed import FOLLOWING, Followed
+from bilayer_core.simulation.gradients.impact_rates import by_impacts, slopes_of_gaps
 from bilayer_core.simulation.gradients.mechanism_rates import resistances, slopes_of_motions
 from bilayer_core.simulation.gradients.step_again import KeptStep, Lacking, StepAgain, cross_matrices
 from bilayer_core.simulation.gradients.transduction_rates import TransductionRates
@@ -79,6 +80,8 @@ class Constants:
         self.strips = self._strips(again)
         self.apart = self._inverse() if len(self.strips.row) else None
         self.of_strains = slice(self.size, self.size + self.strains)
+        gaps = again.problem.restitution
+        self.of_gaps = slice(gaps.first, gaps.first + len(gaps.rate))
         self.of_fluid = slice(self.size + self.strains, self.whole)
         free, moves = np.ones((self.size, 1)), np.ones((self.size, 1))
         free[(problem.constrained.unknown[:, None] + np.arange(3)).ravel()] = 0.0
@@ -277,6 +280,8 @@ class StageRates:
     lacking: Entries | None = None  # G
     by_turn: Entries | None = None  # ∂g/∂a apart from the Hessian, shape (size, n_edge)
     by_director: Entries | None = None  # ∂g by strains at the origin, by drag
+    by_gap: Entries | None = None  # likewise of unknowns, by impacts
+    by_kept: Entries | None = None  # ∂g by what a step keeps for the next, of unknowns, shape (size, n_kept)
     by_origin: Entries | None = None  # ∂g/∂Ȳ by the gyroscopic force, shape (size, size)
     bodies: BodyRates | None = None
     resistance: Array | float = 0.0  # of motions of joints and guides, shape (n_strain, 1)
@@ -308,6 +313,7 @@ class StageDerivatives:
         )
         self.follower = Followed(model, again)
         self._body_flow = body_flow_of(model)
+        self._damped = "restitution" in model.forces
         self._resisted = "joint friction" in model.forces
         self._moving = [n for n in (*FOLLOWING, "inertia", "damping") if n in model.forces]
 
@@ -315,6 +321,9 @@ class StageDerivatives:
         """Return ∂σ/∂q at a configuration."""
         constants = self.constants
         slopes = slopes_of_motions(again, at) if self._resisted else None
+        if self._damped:
+            gaps = slopes_of_gaps(again, at)
+            slopes = gaps if slopes is None else gaps + slopes
         if constants.colours:
             again.differentiate_by_strains(at, self._differences, STRAIN)
             which, seen = constants.seen
@@ -347,6 +356,8 @@ class StageDerivatives:
             velocity = (at.position - stage.origin_position) / stage.length
             found.momentum = self.follower.momentum(again, at, velocity)
             again.follow(at)
+        if self._damped:
+            found.by_gap, found.by_kept = by_impacts(again, at)
         drives, laws = again.problem.drives, again.laws
         if len(laws):
             slope = 1.0 - (laws / drives.law_saturation) ** 2

@@ -106,7 +106,7 @@ class StepAgain(Evaluator):
         Where Newton's method began in each stage.
     reached : Reached
         Where the stage ended that was found last.
-    ended : Point
+    ended, last : Point, Configuration
         The end of the last stage, or of the step where that is beyond it.
     size, wet : int
         Of unknowns, and of the fluid's momentum in their places.
@@ -142,7 +142,7 @@ class StepAgain(Evaluator):
         self._tolerance = tolerance
         self._settles = not {"friction", "rod friction"}.isdisjoint(model.forces)
         self._lack: Lack | None = None
-        self.ended = self._work.end
+        self.ended, self.last = self._work.end, self.places[0]
         self._elastic = [name for name in ELASTIC if name in model.forces]
         layout = self.problem.strands
         self.of_nodes = layout.node_unknown[:, None] + np.arange(3)
@@ -180,6 +180,17 @@ class StepAgain(Evaluator):
     def end_rates(self) -> Array:
         """Rates of strains at the end of the stage, shape (n_strain,)."""
         return self.ended.strain_rate
+
+    @property
+    def speeds(self) -> Array:
+        """Speeds of approach that are in memory during the step, shape (n_pair,)."""
+        return self.speeds_of(self._state)
+
+    def speeds_of(self, state: State) -> Array:
+        """Return the speeds of approach in the memory of a state, shape (n_pair,)."""
+        restitution = self.problem.restitution
+        first = restitution.memory[0] if restitution.exists else 0
+        return state.memory[first : first + len(restitution.rate)]
 
     @property
     def held(self) -> Array:
@@ -258,7 +269,7 @@ class StepAgain(Evaluator):
         end_stage(self.problem, self._arrays, work, self._inputs, n, at)
         work.start_angle[:] = work.end.angle
         at.total_angle[:] = 0.0
-        self.ended = work.end
+        self.ended, self.last = work.end, at
 
     def go_beyond(self, n: int) -> None:
         """Go from the end of the last stage to that of the step, its point n."""
@@ -266,7 +277,7 @@ class StepAgain(Evaluator):
         status = move_beyond(self.problem, self._arrays, step.method, self._inputs, self._work, n, *places)
         if status != READY:
             raise SimulationError("gradient: a step that was made is not possible once more", step.begin)
-        self.ended = self.point
+        self.ended, self.last = self.point, places[1]
 
     def gradient(self, n: int) -> Array:
         """Return the gradient of the potential where stage n ended, shape (size,)."""

@@ -16,12 +16,13 @@ and backward with the transpose of each line. The maps of a stage are those of `
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bilayer_core.engine.steps_again import Reached
 from bilayer_core.model.model import Model
+from bilayer_core.simulation.gradients.impact_rates import speeds_at_end
 from bilayer_core.simulation.gradients.stage_rates import EndRates, StageDerivatives
 from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
 
@@ -44,6 +45,8 @@ class Rates:
         What modes have reached of stimuli, shape (n_mode, n).
     push, strain_push : ndarray
         Rates of velocities, and of rates of strains and of the fluid's momentum, that a history keeps, likewise.
+    kept : ndarray
+        Speeds of approach in the memory of impacts, shape (n_kept, n).
     """
 
     place: Array
@@ -52,12 +55,13 @@ class Rates:
     reached: Array
     push: Array
     strain_push: Array
+    kept: Array
 
     @classmethod
     def zeros(cls, again: StepAgain, columns: int) -> Rates:
         """Return rates of a model without any."""
         strains, modes = again.stage.origin_strain.size, again.transduction.size
-        sizes = again.size, again.size, strains, modes, again.size, strains + again.wet
+        sizes = again.size, again.size, strains, modes, again.size, strains + again.wet, len(again.speeds)
         return cls(*(np.zeros((size, columns)) for size in sizes))
 
 
@@ -123,8 +127,8 @@ class StepRates:
             self.residual = max(self.residual, correction / step.length)
             self._stages.append(self._of.of(again, n, step, followed))
         self.ended, self._end = reached[-1].position, None
+        again = self._agains[stages] if step.beyond else self._agains[stages - 1]
         if step.beyond:
-            again = self._agains[stages]
             again.begin(step)
             for n, place in enumerate(reached):
                 again.start(n)
@@ -133,6 +137,9 @@ class StepRates:
             again.go_beyond(stages)
             self.ended = again.places[stages + 1].position
             self._end = self._of.beyond(again, stages, step)
+        elif len(again.speeds):
+            again.finish(stages - 1)
+        _, *self._remembered = speeds_at_end(again)
         return reached
 
     @property
@@ -209,6 +216,8 @@ class StepRates:
             if len(stage.law_by_gain):
                 laws = stage.law_by_mode @ reached + stage.law_by_gain[:, None] * acts.gain
                 right += stage.by_laws @ laws
+            if stage.by_gap is not None:
+                right += stage.by_gap @ origin[constants.of_strains] + stage.by_kept @ start.kept
             if direct is not None:
                 right += direct[n]
             moved = -self._agains[n].solved(n, constants.free * right, stage.lacking)
@@ -228,11 +237,18 @@ class StepRates:
         if self._end:
             found = self._beyond(self._end, (first, speed), (place, turn), gained, turned)
             found.reached = self._end.transduction.forward(start, acts)
+            found.kept = self._remember(start.kept, found.strain_rate)
             return found
         kept = (end_speed - origin_speed) / stage.momentum_length
         kept = (kept - method.carry * push) / (1.0 - method.carry)
         kept[self._forgotten] = 0.0
-        return Rates(place, end_speed[:size], end_speed[constants.of_strains], reached, kept[:size], kept[size:])
+        speeds = end_speed[:size], end_speed[constants.of_strains]
+        return Rates(place, *speeds, reached, kept[:size], kept[size:], self._remember(start.kept, speeds[1]))
+
+    def _remember(self, kept: Array, strain_rate: Array) -> Array:
+        """Return rates of what is kept for the next step."""
+        by_kept, by_rate = self._remembered
+        return by_kept[:, None] * kept + by_rate[:, None] * strain_rate[self.constants.of_gaps]
 
     def _beyond(
         self,
@@ -281,6 +297,10 @@ class StepRates:
         origin_speeds = [np.zeros_like(push) for _ in range(count)]
         places = [np.zeros((size, columns)) for _ in range(count)]
         direct: list[Array] = [np.zeros((size, columns))] * count
+        by_kept, by_rate = self._remembered
+        start.kept += by_kept[:, None] * end.kept
+        end = replace(end, strain_rate=end.strain_rate.copy())
+        end.strain_rate[constants.of_gaps] += by_rate[:, None] * end.kept
         if beyond := self._end:
             beyond.transduction.backward(end.reached, start, acts)
             self._beyond_back(beyond, end, (first, speed, places[-1]), (ends, end_speeds, origins, origin_speeds))
@@ -330,6 +350,9 @@ class StepRates:
                 reached = reached + stage.law_by_mode.T @ laws
                 acts.gain += stage.law_by_gain[:, None] * laws
             stage.transduction.backward(reached, start, acts)
+            if stage.by_gap is not None:
+                origins[n][constants.of_strains] += stage.by_gap.T @ right
+                start.kept += stage.by_kept.T @ right
             if stage.by_origin is not None:
                 origins[n][:size] += stage.by_origin.T @ spread
             if stage.by_director is not None:

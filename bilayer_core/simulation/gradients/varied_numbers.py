@@ -21,6 +21,7 @@ from bilayer_core.model.state import PARTS, State
 from bilayer_core.observed.frame import Description
 from bilayer_core.simulation.gradients.course import Course
 from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
+from bilayer_core.simulation.gradients.impact_rates import speeds_at_end
 from bilayer_core.simulation.gradients.nearby import (
     PLACES,
     Builders,
@@ -55,6 +56,7 @@ class Direct:
     strain_rate: Array
     reached: Array
     strain_push: Array
+    kept: Array
     next_rates: list[tuple[Array, Array]] | None = None
 
 
@@ -326,6 +328,7 @@ class VariedNumbers:
             np.zeros(here.end_rates.size),
             np.zeros(here.transduction.size),
             np.zeros(here.end_rates.size + here.wet),
+            np.zeros(len(here.speeds)),
         )
         if number.agains:
             own = number.rates or [None] * len(number.agains)
@@ -333,7 +336,7 @@ class VariedNumbers:
                 self._replayed(again, replace(step, start=self.fitted(again, step.start, rates)), reached)
                 for again, rates in zip(number.agains, own, strict=True)
             ]
-            *found.gradient, held, momenta, reached_by, rates, push = (
+            *found.gradient, found.kept, held, momenta, reached_by, rates, push = (
                 slope(values, h) for values in zip(*seen, strict=True)
             )
             for rows, (speed, gained) in ((here.held, held), (here.of_bodies[:, 3:], momenta)):
@@ -368,6 +371,7 @@ class VariedNumbers:
                 push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
         return [
             *gradients,
+            speeds_at_end(again)[0],
             again.speeds_of_held,
             again.momenta_of_bodies,
             again.transduction.copy(),
