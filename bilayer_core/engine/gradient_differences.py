@@ -153,6 +153,7 @@ def differentiate_followed(p, differences, at, trial, stage, h):
     for row in range(differences.by_director.shape[0]):
         for side in range(-1, 2, 2):
             _move_directors(p, differences, row, side * h * DIRECTOR, stage)
+            hold_fixed(p, at, stage)
             _add_forces_on_nodes(p, at, stage, side / (2.0 * h * DIRECTOR), differences.by_director, row)
             _move_directors(p, differences, row, -side * h * DIRECTOR, stage)
     hold_fixed(p, at, stage)
@@ -260,19 +261,21 @@ def _move_directors(p, differences, row, h, stage):
 
 @piece(int, Problem, Differences, Configuration, Configuration, Stage, float)
 def differentiate_momentum(p, differences, at, trial, stage, h):
-    """Write to `by_place` how the fluid's momentum, that about a node in place of its unknowns, depends on a
-    configuration, at the velocities of the record.
+    """Write to `by_place` how the fluid's momentum depends on a configuration, at the velocities of the record: that
+    about a node in place of its unknowns, that of kept directors behind all unknowns.
     """
-    rows = differences.by_place
+    rows, nodes = differences.by_place, p.strands.node_unknown.shape[0]
+    size = rows.shape[1] - 3 * (p.fluid.momentum.shape[0] - nodes)
     rows[:] = 0.0
     for row in range(rows.shape[0]):
         for side in range(-1, 2, 2):
             _write_step(p, differences, row, side * h)
             move(p, at, 1.0, stage, trial)
             fluid_momentum(p.fluid, trial)
-            for i in range(p.strands.node_unknown.shape[0]):
+            for i in range(p.fluid.momentum.shape[0]):
+                place = p.strands.node_unknown[i] if i < nodes else size + 3 * (i - nodes)
                 for c in range(3):
-                    rows[row, p.strands.node_unknown[i] + c] += side / (2.0 * h) * p.fluid.momentum[i, c]
+                    rows[row, place + c] += side / (2.0 * h) * p.fluid.momentum[i, c]
     return READY
 
 

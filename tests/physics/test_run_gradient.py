@@ -85,6 +85,9 @@ DRIES = {"materials.tissue.retardation_time": 0.01, "rods.valve.layers.outer.int
 OF_TIP = {"drag": {"coefficient": 0.5, "area": 1e-3}}
 DRAGGED = {"bodies": [WALL, AT_TIP["bodies"][1] | OF_TIP], "fluid": WATER | {"added_mass": True}}
 SPUN = HANGING | SPACE | MIDPOINT | {"bodies.wall.motion": SPINNING, LAG: 0.05}
+OFF_CURVE = HANGING | {THICKNESS: 1.5e-4, DENSITY: 2000.0}
+PUSHED_OFF = OFF_CURVE | SPACE | {"loads": [JET], "solver.integrator": "sdirk2"}
+WADES = PUSHED_OFF | {MODULUS: 3e7, "fluid": WATER | {"added_mass": True}}
 RESTS = {"start": "settle", "stimuli.swelling.schedule.from": 0.3}
 CASES = {
     "in a plane": ("bending", HANGING, 0.2, [GAIN, LEVEL, TIME, MODULUS, THICKNESS, "gravity.2", LENGTH]),
@@ -96,7 +99,10 @@ CASES = {
     "generalised alpha": ("bending", HANGING | ALPHA | VISCOUS | SPACE, 0.1, [GAIN, MODULUS, THICKNESS]),
     "layers that become unlike": ("bending", HANGING | UNLIKE, 0.1, [MODULUS, DENSITY]),
     "a lag": ("bending", HANGING | {LAG: 0.05}, 0.2, [GAIN, LEVEL, LAG]),
-    "masses off the curve": ("bending", HANGING | {THICKNESS: 1.5e-4, DENSITY: 2000.0}, 0.1, [THICKNESS, LENGTH]),
+    "masses off the curve": ("bending", OFF_CURVE, 0.1, [THICKNESS, LENGTH]),
+    "masses off the curve that turn": ("bending", PUSHED_OFF, 0.05, [GAIN, THICKNESS, "loads.0.force.2"]),
+    "added mass of unlike layers": ("bending", WADES, 0.05, [GAIN, THICKNESS, "loads.0.force.2"]),
+    "added mass of layers that become unlike": ("bending", HANGING | ALPHA | IN_WATER | HEAVY, 0.05, [THICKNESS]),
     "a clamp that moves": ("bending", HANGING | MOVES, 0.1, [GAIN, "bodies.wall.motion.displacements.1.2"]),
     "a strip that curls": ("bending", HANGING | {"rods.strip.section": "strip", LEVEL: 0.3}, 0.2, [GAIN, MODULUS]),
     "fibres in space": ("chiral_pod", {}, 0.02, ["gravity.2"]),
@@ -227,6 +233,7 @@ BACK = {
     "a body in water": ("bending", AT_TIP | DRAGGED, 0.01, ["fluid.density"]),
     "a viscous strip of fibres": ("chiral_pod", DRIES, 0.01, ["gravity.2"]),
     "added mass": ("flagellum", {}, 0.05, ["fluid.density"]),
+    "added mass of unlike layers": ("bending", WADES | ALPHA, 0.05, [GAIN, "fluid.density"]),
     "drag of turns": ("bending", IN_WATER | {"loads": [JET]}, 0.1, ["fluid.density"]),
 }
 

@@ -110,8 +110,6 @@ class RunResponse:
         model, methods = self.model, self._stepper.engine.methods
         others = [name for name in model.forces if name not in DIFFERENTIATED]
         reasons = [f"the force {name!r}" for name in others]
-        if "added mass" in model.forces and self._stepper.engine.problem.raised.exists:
-            reasons.append("added mass of layers that are unlike")
         if "added mass" in model.forces and any(len(m.couplings) > m.couplings.shape[1] for m in methods):
             reasons.append("added mass with an integrator whose steps end beyond their last stage")
         problem = self._stepper.engine.problem

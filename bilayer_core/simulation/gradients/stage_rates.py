@@ -83,6 +83,9 @@ class Constants:
         gaps = again.problem.restitution
         self.of_gaps = slice(gaps.first, gaps.first + len(gaps.rate))
         self.of_fluid = slice(self.size + self.strains, self.whole)
+        self.moving = slice(0, self.size + self.strains)
+        first = self.size + problem.raised.first
+        self.wet_strains = slice(first, first + again.wet - self.size) if again.wet else slice(0, 0)
         free, moves = np.ones((self.size, 1)), np.ones((self.size, 1))
         free[(problem.constrained.unknown[:, None] + np.arange(3)).ravel()] = 0.0
         prescribed = problem.constrained.free < 0
@@ -116,6 +119,15 @@ class Constants:
     def masses(self, of: Array) -> Array:
         """Return 𝓜 times columns."""
         return self.mass * of + self.coupling @ of if len(self.coupling.row) else self.mass * of
+
+    def push_fluid(self, change: Array, momentum: Array) -> None:
+        """Add momenta of the fluid to what changes of nodes and strains take."""
+        change[: self.size] += momentum[: self.size]
+        change[self.wet_strains] += momentum[self.size :]
+
+    def fluid_pushed(self, change: Array) -> Array:
+        """Return the transpose."""
+        return np.concatenate([change[: self.size], change[self.wet_strains]])
 
     def dissipation(self, of: Array, masses: Array) -> Array:
         """Return 𝓓 times columns, from 𝓜 times these."""
@@ -353,8 +365,9 @@ class StageDerivatives:
         if found.bodies:
             found.bodies.add_slides(again, at, followed[3])
         if again.wet:
-            velocity = (at.position - stage.origin_position) / stage.length
-            found.momentum = self.follower.momentum(again, at, velocity)
+            raised, velocity = again.problem.raised, (at.position - stage.origin_position) / stage.length
+            turned = at.director1[raised.edge] - stage.origin_strain[constants.raised_rows]
+            found.momentum = self.follower.momentum(again, at, velocity, turned / stage.length)
             again.follow(at)
         if self._damped:
             found.by_gap, found.by_kept = by_impacts(again, at)
@@ -399,7 +412,9 @@ class StageDerivatives:
         along = (np.eye(3) - t[:, :, None] * t[:, None, :]) / length[:, :, None]
         scaled, crossing = (factor * turned)[:, :, None], cross_matrices(t)
         again.forces(at, self._moving)
-        ahead = again.sums.edge[:edges, 3]  # moments of forces that see turns since the start of the stage
+        ahead = again.sums.edge[:edges, 3].copy()  # moments of forces that see turns since the start of the stage
+        raised = again.problem.raised.edge  # whose directors turn with frames
+        ahead[raised] -= np.einsum("ki,ki->k", again.sums.pull[: len(raised)], at.director2[raised])
         by_vector = scaled * (crossing - cross_matrices(lengthened) @ along)
         by_vector -= 2.0 * force[:, :, None] * (t / length)[:, None, :]
         by_vector += 0.5 * crossing * (ahead / at.length[:edges] ** 2)[:, None, None]

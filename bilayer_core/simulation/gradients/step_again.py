@@ -109,7 +109,7 @@ class StepAgain(Evaluator):
     ended, last : Point, Configuration
         The end of the last stage, or of the step where that is beyond it.
     size, wet : int
-        Of unknowns, and of the fluid's momentum in their places.
+        Of unknowns, and of the fluid's momentum: in their places, then of kept directors.
     """
 
     def __init__(
@@ -150,7 +150,8 @@ class StepAgain(Evaluator):
         self._rods = len(self.sums.gradient)
         self.size = self._rods + 6 * bodies
         self.of_bodies = self._rods + np.arange(6 * bodies).reshape(bodies, 6)
-        self.wet = self.size if self.problem.fluid.exists else 0
+        fluid = self.problem.fluid
+        self.wet = self.size + 3 * (len(fluid.momentum) - model.node_count) if fluid.exists else 0
 
     def begin(self, step: KeptStep) -> None:
         """Take the start of a step, with what acts during it."""
@@ -216,10 +217,14 @@ class StepAgain(Evaluator):
     @property
     def gained_momentum(self) -> Array:
         """Gain of the fluid's momentum over the stage, shape (wet,)."""
-        gained = np.zeros(self.wet)
+        return self.wetted(self.ended.fluid_momentum - self.point.fluid_momentum)
+
+    def wetted(self, rows: Array) -> Array:
+        """Return what the fluid has about nodes and kept directors, shape (n, 3), in the places of its momenta."""
+        found, nodes = np.zeros(self.wet), len(self.of_nodes)
         if self.wet:
-            gained[self.of_nodes] = self.ended.fluid_momentum - self.point.fluid_momentum
-        return gained
+            found[self.of_nodes], found[self.size :] = rows[:nodes], rows[nodes:].ravel()
+        return found
 
     @property
     def origin_rates(self) -> Array:

@@ -121,7 +121,9 @@ class StepRates:
             if n == 0:
                 self._start_strains = self._of.strains(again, again.places[0])
                 if again.wet:
-                    self._start_momentum = self._of.follower.momentum(again, again.places[0], step.start.velocity)
+                    rates = step.start.strain_rate[self.constants.raised_rows]
+                    moving = step.start.velocity, rates
+                    self._start_momentum = self._of.follower.momentum(again, again.places[0], *moving)
             place, correction, followed = again.find(n, self._of.follower.matrices)
             reached.append(place)
             self.residual = max(self.residual, correction / step.length)
@@ -172,7 +174,7 @@ class StepRates:
         speed = np.concatenate([constants.moves * start.speed, start.strain_rate, none])
         if len(none):
             by_place, by_speed = self._start_momentum
-            speed[fluid] = by_place @ start.place + by_speed @ speed[:size]
+            speed[fluid] = by_place @ start.place + by_speed @ speed[constants.moving]
         push = np.concatenate([start.push, start.strain_push])
         place, turn = start.place, np.zeros((len(edges), start.place.shape[1]))
         gained: list[tuple[Array, Array]] = []
@@ -195,9 +197,9 @@ class StepRates:
             change = -(of_mass + stage.length * constants.masses(origin_speed)) / stage.momentum_length
             change = (change - constants.dissipation(origin, of_mass)) / stage.length
             change[constants.of_strains] -= stage.resistance * origin[constants.of_strains] / stage.length
-            right = change[:size] + stage.strains.pull_back(change[constants.of_strains])
             if stage.momentum:
-                right -= origin_speed[fluid] / stage.momentum_length
+                constants.push_fluid(change, -origin_speed[fluid] / stage.momentum_length)
+            right = change[:size] + stage.strains.pull_back(change[constants.of_strains])
             before = np.zeros_like(turn)
             if stage.way:
                 guess = constants.free * (origin[:size] + stage.length * origin_speed[:size])
@@ -231,7 +233,7 @@ class StepRates:
                 bodies.end(end, origin_speed, ahead, end_speed)
                 turned.append((end, origin))
             if stage.momentum:
-                end_speed[fluid] = stage.momentum[0] @ moved + stage.momentum[1] @ end_speed[:size]
+                end_speed[fluid] = stage.momentum[0] @ moved + stage.momentum[1] @ end_speed[constants.moving]
             gained.append((end - origin, end_speed - origin_speed))
             place, turn = moved, end[edges]
         if self._end:
@@ -318,7 +320,7 @@ class StepRates:
             of_momentum = end_speeds[n][fluid].copy()
             end_speeds[n][fluid] = 0.0
             if stage.momentum:
-                end_speeds[n][:size] += stage.momentum[1].T @ of_momentum
+                end_speeds[n][constants.moving] += stage.momentum[1].T @ of_momentum
                 places[n] += stage.momentum[0].T @ of_momentum
             if bodies := stage.bodies:
                 ahead = bodies.end_back(ends[n], origin_speeds[n], end_speeds[n])
@@ -337,7 +339,7 @@ class StepRates:
             if bodies:
                 ahead += bodies.push_back(right)
             if stage.momentum:
-                origin_speeds[n][fluid] -= spread / stage.momentum_length
+                origin_speeds[n][fluid] -= constants.fluid_pushed(change) / stage.momentum_length
             of_mass = constants.masses(change)
             drag = constants.dissipation(change, of_mass) / stage.length
             of_mass = of_mass / (stage.length * stage.momentum_length)
@@ -393,7 +395,7 @@ class StepRates:
         if fluid.stop > fluid.start:
             by_place, by_speed = self._start_momentum
             start.place += by_place.T @ speed[fluid]
-            speed[:size] += by_speed.T @ speed[fluid]
+            speed[constants.moving] += by_speed.T @ speed[fluid]
         start.speed += constants.moves * speed[:size]
         start.strain_rate += speed[constants.of_strains]
         start.push, start.strain_push = push[:size], push[size:]

@@ -213,7 +213,8 @@ class VariedNumbers:
             raised = [of.problem.raised.edge for of in (found.agains[0], self.here)]
             if found.agains[0].end_rates.size != self.here.end_rates.size or not np.array_equal(*raised):
                 states = [self._builders.state_of(again.model) for again in found.agains]
-                found.rates = [(state.strain_rate, state.strain_acceleration) for state in states]
+                wet = np.zeros(found.agains[0].wet)
+                found.rates = [(of.strain_rate, np.concatenate([of.strain_acceleration, wet])) for of in states]
         for again in found.agains:
             refuse_other_plane(self.model, again.model, path, moves=False)
         if any(
@@ -349,6 +350,9 @@ class VariedNumbers:
                 found.strain_rate, found.strain_push = rates, push
             else:
                 found.next_rates = [(values[-2], values[-1]) for values in seen]
+                if here.wet:
+                    first, own = here.end_rates.size, number.agains[0].end_rates.size
+                    found.strain_push[first : first + here.size] = push[own : own + here.size]
         return found
 
     def _replayed(self, again: StepAgain, step: KeptStep, reached: Sequence[Reached]) -> list[Array]:
@@ -364,9 +368,10 @@ class VariedNumbers:
             again.go_beyond(len(reached))
         carry = step.method.carry
         push = (again.end_rates - again.origin_rates) / again.stage.momentum_length
-        of_fluid = again.gained_momentum / (again.stage.momentum_length * (1.0 - carry))
+        of_fluid = again.gained_momentum / again.stage.momentum_length
         if self._history:
             push = (push - carry * step.start.strain_acceleration) / (1.0 - carry)
+            of_fluid = (of_fluid - carry * again.wetted(step.start.fluid_force)) / (1.0 - carry)
             if not step.method.history:
                 push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
         return [
@@ -400,7 +405,10 @@ class VariedNumbers:
         if rates is not None:
             fitted.strain_rate[:] = rates[0]
             if self._history:
-                fitted.strain_acceleration[:] = rates[1]
+                strains, nodes = len(rates[0]), len(state.fluid_force)
+                fitted.strain_acceleration[:] = rates[1][:strains]
+                fitted.fluid_force[:nodes] = state.fluid_force
+                fitted.fluid_force[nodes:] = rates[1][strains + again.size :].reshape(-1, 3)
         again.begin(KeptStep(fitted, fitted, self._stepper.engine.methods[0]))
         moved, constrained = again.problem.bodies.prescribed, again.problem.constrained
         moved = moved[moved < len(fitted.body_position)]

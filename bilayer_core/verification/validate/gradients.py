@@ -162,6 +162,8 @@ LEVEL, GAIN = "stimuli.swelling.schedule.to", f"{ACTIVE}.eigenstrain.gain"
 SWELLING = HANGING | {LEVEL: 0.8}
 VISCOUS = {"materials.active.retardation_time": 0.05}
 EULER = {"solver.integrator": "implicit_euler", "solver.dt": 0.004, "solver.tolerance": None}
+WATER = {"density": 1000.0, "velocity": [0, 0.05, 0], "drag_along": 0.01, "drag_across": 1.0, "added_mass": True}
+UNLIKE_IN_WATER = SWELLING | {"materials.active.youngs_modulus": 3e7, "fluid": WATER}
 STRIDE = {"stimuli.humidity.schedule.period": 0.4}
 GRIP = EULER | {"solver.dt": 0.001, "stimuli.humidity.schedule.start": 0, "stimuli.humidity.schedule.end": 0.05}
 THROWN, BALL = thrown(1e9, 3, restitution=0.5), "body/ball/position"
@@ -179,6 +181,7 @@ RUNS: dict[str, tuple[Any, ...]] = {
     "fibres/gravity": ("chiral_pod", {}, 0.02, "gravity.2"),
     "swimmer/density of the fluid": ("swimming", {}, 0.01, "fluid.density"),
     "added mass/density of the fluid": ("flagellum", {}, 0.05, "fluid.density"),
+    "added mass of unlike layers/density of the fluid": ("bending", UNLIKE_IN_WATER, 0.05, "fluid.density"),
     "drag/density of the fluid": ("flagellum", {"fluid.added_mass": False}, 0.05, "fluid.density"),
 }
 RUBBING: dict[str, tuple[Any, ...]] = {
