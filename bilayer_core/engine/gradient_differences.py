@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bilayer_core.contact.gap import gap_normal
 from bilayer_core.engine.configuration import move
 from bilayer_core.engine.laws import grow
 from bilayer_core.engine.linear.assembly import expand_gradient
@@ -14,10 +15,13 @@ from bilayer_core.forces.added_mass import fluid_momentum
 from bilayer_core.forces.elements import start_elements
 from bilayer_core.forces.rod_contact import find_rod_contacts
 from bilayer_core.jit import kernel, piece, record
-from bilayer_core.jit.record import Flags, Indices, Matrix
+from bilayer_core.jit.record import Flags, Indices, Matrix, Vector
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Stage, Work
+
+DIRECTOR = 1024.0
+"""Change of a director over that of a position [1/m]."""
 
 
 @record
@@ -32,6 +36,7 @@ class Differences:
         Matrix  # for each colour a row for each way of nodes, a row for each colour of edges, then those of bodies
     )
     by_origin: Matrix
+    by_director: Matrix  # of raised edges at the origin: for each colour of edges a row for each component
     pressing: Flags  # forces that are evaluated before others take anything from a configuration, shape (n_force,)
     following: Flags  # these others
 
@@ -45,6 +50,14 @@ class StrainDifferences:
     by_law: Matrix  # shape (n_law, size)
     colour: Indices  # of strains, −1 for those that stay
     by_strain: Matrix  # a row for each colour
+
+
+@record
+class Gaps:
+    """Gaps of pairs whose impacts are damped."""
+
+    gap: Vector  # [m]
+    normal: Matrix
 
 
 @kernel
@@ -114,6 +127,7 @@ def differentiate_followed(p, differences, at, trial, stage, h):
     by_place, by_origin, selected = differences.by_place, differences.by_origin, p.sums.selected
     by_place[:] = 0.0
     by_origin[:] = 0.0
+    differences.by_director[:] = 0.0
     for row in range(by_place.shape[0]):
         for side in range(-1, 2, 2):
             _write_step(p, differences, row, side * h)
@@ -132,25 +146,54 @@ def differentiate_followed(p, differences, at, trial, stage, h):
             hold_fixed(p, at, stage)
             _add_forces_on_nodes(p, at, stage, side / (2.0 * h), by_origin, row)
             _move_origin(p, stage, -1.0)
+    for row in range(differences.by_director.shape[0]):
+        for side in range(-1, 2, 2):
+            _move_directors(p, differences, row, side * h * DIRECTOR, stage)
+            hold_fixed(p, at, stage)
+            _add_forces_on_nodes(p, at, stage, side / (2.0 * h * DIRECTOR), differences.by_director, row)
+            _move_directors(p, differences, row, -side * h * DIRECTOR, stage)
     hold_fixed(p, at, stage)
     return READY
 
 
+@kernel
+def _move_directors(p, differences, row, h, stage):
+    """Move a component of those of a colour at the origin of a stage."""
+    raised = p.raised
+    for r in range(raised.edge.shape[0]):
+        if differences.edge_colour[raised.edge[r]] == row // 3:
+            stage.origin_strain[raised.first + 3 * raised.slot[r] + row % 3] += h
+
+
 @piece(int, Problem, Differences, Configuration, Configuration, Stage, float)
 def differentiate_momentum(p, differences, at, trial, stage, h):
-    """Write to `by_place` how the fluid's momentum, that about a node in place of its unknowns, depends on a
-    configuration, at the velocities of the record.
+    """Write to `by_place` how the fluid's momentum depends on a configuration, at the velocities of the record: that
+    about a node in place of its unknowns, that of kept directors behind all unknowns.
     """
-    rows = differences.by_place
+    rows, nodes = differences.by_place, p.strands.node_unknown.shape[0]
+    size = rows.shape[1] - 3 * (p.fluid.momentum.shape[0] - nodes)
     rows[:] = 0.0
     for row in range(rows.shape[0]):
         for side in range(-1, 2, 2):
             _write_step(p, differences, row, side * h)
             move(p, at, 1.0, stage, trial)
             fluid_momentum(p.fluid, trial)
-            for i in range(p.strands.node_unknown.shape[0]):
+            for i in range(p.fluid.momentum.shape[0]):
+                place = p.strands.node_unknown[i] if i < nodes else size + 3 * (i - nodes)
                 for c in range(3):
-                    rows[row, p.strands.node_unknown[i] + c] += side / (2.0 * h) * p.fluid.momentum[i, c]
+                    rows[row, place + c] += side / (2.0 * h) * p.fluid.momentum[i, c]
+    return READY
+
+
+@piece(int, Problem, Configuration, Gaps)
+def write_gaps(p, at, out):
+    """Write the gaps of pairs whose impacts are damped."""
+    pairs, x = p.restitution, at.contact_point
+    for k in range(out.gap.shape[0]):
+        i, s = pairs.point[k], pairs.surface[k]
+        found = gap_normal(p.surfaces, at, p.surfaces.radius[i], s, x[i, 0], x[i, 1], x[i, 2])
+        out.gap[k] = found[0]
+        out.normal[k, 0], out.normal[k, 1], out.normal[k, 2] = found[1], found[2], found[3]
     return READY
 
 

@@ -38,7 +38,11 @@ class StageMaps:
     by_origin: LackingMatrix  # by the origin of the stage, but for what inertia, damping and viscosity have
     by_turn: Vector  # moments of edges by their turns, beyond what `by_origin` has with another sign, shape (n_edge,)
     slides: LackingMatrix  # by turns of R̃ and by ω̃ of free bodies, six columns each
-    by_director: Stack  # by directors of raised edges at the origin: of nodes and turns, shape (n_raised, 7, 3)
+    by_strain: LackingMatrix  # by strains at the origin, but for what viscosity has
+    by_kept: LackingMatrix  # by what a step keeps for the next
+    by_director: (
+        Stack  # by drag, by directors of raised edges at the origin: of nodes and turns, shape (n_raised, 7, 3)
+    )
     way: Stack  # of turns, by vectors at the start, at the first guess and at the end, shape (3, n_edge, 3)
     edge_of: Indices  # the edge that an unknown turns, or −1
     moving: Flags  # forces that see turns since the start of the stage
@@ -50,6 +54,8 @@ def clear_maps(maps):
     clear(maps.lacking)
     clear(maps.by_origin)
     clear(maps.slides)
+    clear(maps.by_strain)
+    clear(maps.by_kept)
     maps.by_director[:] = 0.0
     return READY
 
@@ -232,6 +238,9 @@ def differentiate_turns(p, maps, start, guess, at, stage, seen):
     for k in range(sums.selected.shape[0]):
         sums.selected[k] = maps.moving[k]
     add_forces(p, at, stage, False, False)
+    for r in range(p.raised.edge.shape[0]):  # whose directors turn with frames
+        k = p.raised.edge[r]
+        sums.edge[k, 3] -= dot(row(sums.pull, r), row(at.director2, k))
     way[:] = 0.0
     for e in range(strands.edge_count):
         _write_way(start, guess, e, way[0], way[1])
@@ -282,3 +291,12 @@ def _add_turns(strands, maps):
         e = maps.edge_of[origin.column[k]]
         if e >= 0:
             _add_turned(strands, origin.row[k], e, -origin.value[k], way, maps.lacking)
+
+
+@piece(int, Problem, StageMaps, Configuration, Configuration)
+def write_last_way(p, maps, start, at):
+    """Write the ways of turns from the last stage of a step to its end beyond it."""
+    maps.way[:] = 0.0
+    for e in range(p.strands.edge_count):
+        _write_way(start, at, e, maps.way[0], maps.way[1])
+    return READY

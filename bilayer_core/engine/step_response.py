@@ -11,7 +11,7 @@ Newton's method, and G what it lacks. So along a motion of the origin
     (H + G) dq = −dg,    dY = P dq,    dV = (dY − dȲ)/L
 
 and backward with the transpose of each line. All vectors have unknowns first, then strains, then the fluid's momentum
-in the places of unknowns.
+in the places of unknowns and of kept directors.
 """
 
 from __future__ import annotations
@@ -66,10 +66,10 @@ class StrainMap:
 
 @record
 class FluidMap:
-    """Derivatives of the fluid's momentum, in the places of unknowns."""
+    """Derivatives of the fluid's momentum."""
 
     by_place: LackingMatrix
-    by_speed: LackingMatrix
+    by_speed: LackingMatrix  # of unknowns and strains
 
 
 @record
@@ -95,6 +95,7 @@ class StateRates:
     reached: Vector  # what modes have reached of stimuli
     push: Vector  # rates of velocities that a history keeps
     strain_push: Vector  # of rates of strains, and of the fluid's momentum
+    kept: Vector  # speeds of approach in the memory of impacts
 
 
 @record
@@ -217,6 +218,12 @@ def _forgotten(p, method, j, strains):
     return not kept and not (p.raised.exists and j >= p.raised.first)
 
 
+@kernel
+def _wet_place(p, size, j):
+    """Return where the fluid's momentum j acts, among unknowns and strains."""
+    return j if j < size else j + p.raised.first
+
+
 @piece(int, Problem, Method, StepConstants, StrainMap, FluidMap, StateRates, StepWork)
 def begin_forward(p, method, c, strains, fluid, start, w):
     """Take the motion of the start of a step."""
@@ -236,7 +243,7 @@ def begin_forward(p, method, c, strains, fluid, start, w):
     if whole > size + count:
         wet = w.speed[size + count :]
         multiply(fluid.by_place, start.place, False, wet)
-        multiply(fluid.by_speed, w.speed[:size], False, wet)
+        multiply(fluid.by_speed, w.speed, False, wet)
     return READY
 
 
@@ -274,10 +281,10 @@ def go_forward(p, at, stage, method, lack, lacks, c, maps, elastic, bodies, star
     _add_dissipation(c, origin, w.mass, -1.0 / length, change)
     for j in range(strains):
         change[size + j] -= elastic.resistance[j] * origin[size + j] / length
+    for j in range(whole - size - strains):
+        change[_wet_place(p, size, j)] -= origin_speed[size + strains + j] / momentum_length
     for j in range(size):
         right[j] = change[j]
-        if whole > size + strains:
-            right[j] -= origin_speed[size + strains + j] / momentum_length
     _add_strains_back(p, elastic.strains, change, size, right)
     before[:] = 0.0
     if in_space:
@@ -302,6 +309,8 @@ def go_forward(p, at, stage, method, lack, lacks, c, maps, elastic, bodies, star
         for k in range(7):
             for d in range(3):
                 right[unknown_of_edge(strands, p.raised.edge[r], k)] += maps.by_director[r, k, d] * origin[first + d]
+    multiply(maps.by_strain, origin[size:], False, right)
+    multiply(maps.by_kept, start.kept, False, right)
     for k in range(maps.slides.count[0]):
         j = maps.slides.column[k]
         right[maps.slides.row[k]] += maps.slides.value[k] * bodies.motion[j // 6, j % 6]
@@ -331,7 +340,7 @@ def go_forward(p, at, stage, method, lack, lacks, c, maps, elastic, bodies, star
         wet = end_speed[size + strains :]
         wet[:] = 0.0
         multiply(elastic.fluid.by_place, moved, False, wet)
-        multiply(elastic.fluid.by_speed, end_speed[:size], False, wet)
+        multiply(elastic.fluid.by_speed, end_speed, False, wet)
     return READY
 
 
@@ -353,17 +362,92 @@ def end_forward(p, stage, method, end, w, n):
     return READY
 
 
-@piece(int, Problem, Stage, Method, StateRates, StateRates, InputRates, StepWork, int)
-def begin_backward(p, stage, method, end, start, acts, w, n):
-    """Take the derivatives by the end of a step, whose last stage is n."""
-    size, strains = end.place.shape[0], end.strain_rate.shape[0]
-    for part in (w.first, w.speed, w.push, start.place, start.speed, start.strain_rate, start.reached):
+@piece(int, Problem, Configuration, Method, StepConstants, StageMaps, ElasticMaps, BodyMaps, StateRates, StateRates,
+       InputRates, StepWork, int)  # fmt: skip
+def end_forward_beyond(p, at, method, c, maps, elastic, bodies, start, end, acts, w, n):
+    """Write the motion of the end of a step beyond its last stage, its point n, at a configuration."""
+    strands, size, strains = p.strands, end.place.shape[0], end.strain_rate.shape[0]
+    place, speed, last = w.change, w.mass, n - 1
+    for j in range(w.first.shape[0]):
+        place[j], speed[j] = w.first[j], w.speed[j]
+        for i in range(n):
+            place[j] += method.couplings[n, i] * (w.end[i, j] - w.origin[i, j])
+            speed[j] += method.couplings[n, i] * (w.end_speed[i, j] - w.origin_speed[i, j])
+    turn_origin(p, bodies, method, n, w.first, w.speed, w.push, w.end, w.origin, place)
+    spread(p, at, place)
+    for e in range(strands.edge_unknown.shape[0] if p.space.exists else 0):
+        k = strands.edge_unknown[e]
+        place[k] -= w.end[last, k] - w.place[last, k] + _along(strands, maps.way[0], e, w.place[last])
+        place[k] -= _along(strands, maps.way[1], e, place)
+    for j in range(size):
+        end.place[j], end.speed[j], end.push[j] = place[j], speed[j], 0.0
+    for j in range(strains):
+        end.strain_rate[j] = speed[size + j]
+    end.strain_push[:] = 0.0
+    for m in range(c.channel.shape[0]):
+        k = c.channel[m]
+        end.reached[m] = elastic.lag[0, m] * start.reached[m]
+        end.reached[m] += elastic.lag[1, m] * acts.first[k] + elastic.lag[2, m] * acts.stimulus[n, k]
+    return READY
+
+
+@kernel
+def _begin_backward(start, acts, w):
+    """Clear what derivatives are added to."""
+    for part in (w.first, w.speed, w.push, start.place, start.speed, start.strain_rate, start.reached, start.kept):
         part[:] = 0.0
     for part in (w.end, w.end_speed, w.origin, w.origin_speed, w.place):
         part[:] = 0.0
     acts.first[:] = 0.0
     acts.gain[:] = 0.0
     acts.stimulus[:] = 0.0
+
+
+@piece(int, Problem, Configuration, Method, StepConstants, StageMaps, ElasticMaps, BodyMaps, StateRates, StateRates,
+       InputRates, StepWork, int)  # fmt: skip
+def begin_backward_beyond(p, at, method, c, maps, elastic, bodies, end, start, acts, w, n):
+    """Take the derivatives by the end of a step beyond its last stage, its point n, at a configuration."""
+    strands, size, strains = p.strands, end.place.shape[0], end.strain_rate.shape[0]
+    place, speed, last = w.change, w.mass, n - 1
+    _begin_backward(start, acts, w)
+    place[:] = 0.0
+    speed[:] = 0.0
+    for j in range(size):
+        place[j], speed[j] = end.place[j], end.speed[j]
+    for j in range(strains):
+        speed[size + j] = end.strain_rate[j]
+    for e in range(strands.edge_unknown.shape[0] if p.space.exists else 0):
+        k = strands.edge_unknown[e]
+        w.before[e] = place[k]
+        _along_back(strands, maps.way[0], e, -place[k], w.place[last])
+        w.place[last, k] += place[k]
+        w.end[last, k] -= place[k]
+    for e in range(strands.edge_unknown.shape[0] if p.space.exists else 0):
+        _along_back(strands, maps.way[1], e, -w.before[e], place)
+    gather(p, at, place)
+    turn_origin_back(p, bodies, method, n, w.first, w.speed, w.push, w.end, w.origin, place)
+    for j in range(w.first.shape[0]):
+        w.first[j] += place[j]
+        w.speed[j] += speed[j]
+        for i in range(n):
+            coupling = method.couplings[n, i]
+            w.end[i, j] += coupling * place[j]
+            w.origin[i, j] -= coupling * place[j]
+            w.end_speed[i, j] += coupling * speed[j]
+            w.origin_speed[i, j] -= coupling * speed[j]
+    for m in range(c.channel.shape[0]):
+        k = c.channel[m]
+        start.reached[m] += elastic.lag[0, m] * end.reached[m]
+        acts.first[k] += elastic.lag[1, m] * end.reached[m]
+        acts.stimulus[n, k] += elastic.lag[2, m] * end.reached[m]
+    return READY
+
+
+@piece(int, Problem, Stage, Method, StateRates, StateRates, InputRates, StepWork, int)
+def begin_backward(p, stage, method, end, start, acts, w, n):
+    """Take the derivatives by the end of a step, whose last stage is n."""
+    size, strains = end.place.shape[0], end.strain_rate.shape[0]
+    _begin_backward(start, acts, w)
     for j in range(w.first.shape[0]):
         push = end.push[j] if j < size else end.strain_push[j - size]
         push /= 1.0 - method.carry
@@ -392,8 +476,8 @@ def go_backward(p, at, stage, method, lack, lacks, c, maps, elastic, bodies, end
     origin, origin_speed, end, end_speed = w.origin[n], w.origin_speed[n], w.end[n], w.end_speed[n]
     change, moved, before, right = w.change, w.moved, w.before, acts.direct[n]
     if whole > size + strains:
-        wet = w.mass[:size]
-        for j in range(size):
+        wet = w.mass[: whole - size - strains]
+        for j in range(wet.shape[0]):
             wet[j] = end_speed[size + strains + j]
             end_speed[size + strains + j] = 0.0
         multiply(elastic.fluid.by_speed, wet, True, end_speed)
@@ -418,9 +502,9 @@ def go_backward(p, at, stage, method, lack, lacks, c, maps, elastic, bodies, end
     change[:] = 0.0
     for j in range(size):
         change[j] = moved[j]
-        if whole > size + strains:
-            origin_speed[size + strains + j] -= moved[j] / momentum_length
     _add_strains(p, elastic.strains, moved, change, size)
+    for j in range(whole - size - strains):
+        origin_speed[size + strains + j] -= change[_wet_place(p, size, j)] / momentum_length
     push_bodies_back(p, bodies, -1.0 / (length * momentum_length), right)
     for k in range(maps.slides.count[0]):
         j = maps.slides.column[k]
@@ -448,6 +532,8 @@ def go_backward(p, at, stage, method, lack, lacks, c, maps, elastic, bodies, end
         start.reached[m] += elastic.lag[0, m] * w.reached[m]
         acts.first[k] += elastic.lag[1, m] * w.reached[m]
         acts.stimulus[n, k] += elastic.lag[2, m] * w.reached[m]
+    multiply(maps.by_strain, moved, True, origin[size:])
+    multiply(maps.by_kept, moved, True, start.kept)
     pulled = w.guess
     for j in range(size):
         pulled[j] = 0.0

@@ -170,6 +170,8 @@ def expect_end(p, start, end, method, work, n, h, first, guess, reached):
             copy_matrix(end.body_rotation, bodies.body_of_free[f], reached.body_rotation, f)
         return READY
     coupling = method.couplings[n + 1, n]
+    if n + 1 == method.couplings.shape[1]:
+        length = 0.0  # the step ends beyond its last stage
     along, bend = (method.along[n + 1] * h, method.bend * h * h) if method.history else (0.0, 0.0)
     for i in range(end.position.shape[0]):
         for c in range(3):

@@ -28,7 +28,7 @@ from bilayer_core.simulation.gradients.step_again import StepAgain
 
 Array = np.ndarray
 BY_DIFFERENCES = ("added mass", "followers", "moments", "rod friction")
-PRESSING = ("barrier", "rod barrier")
+PRESSING = ("barrier", "rod barrier", "restitution")
 """On which friction depends."""
 REACH = 2
 """Nodes along a strand over which such a force at one depends on another."""
@@ -36,7 +36,7 @@ FINE = 1e-5
 """Of the slip within which friction rests, of the smallest gap, and of a tenth of an edge: steps of differences."""
 SLIP = 1e-3
 """Likewise, where differences see no kink of friction."""
-ORIGIN = ("origin_position", "origin_angle")
+ORIGIN = ("origin_position", "origin_angle", "origin_strain")
 """Parts of a stage that are moved."""
 
 
@@ -100,6 +100,16 @@ class Followed:
                 entries += [(3 * colour + c, row, again.of_nodes[i, c]) for row in seen]
             for unknown in station[i][1] if self._turns else ():
                 entries += [(3 * self._count + colour, row, unknown) for row in seen]
+        raised, of_directors = again.problem.raised, [(0, 0, 0)][:0]
+        self._raised = len(raised.edge) > 0 and "added mass" in model.forces
+        for edge, slot in zip(raised.edge, raised.slot, strict=True) if self._raised else ():
+            i = self._first[edge]
+            near = [
+                j for j in range(max(i - self._reach, 0), min(i + self._reach + 2, nodes)) if strand[j] == strand[i]
+            ]
+            for row in np.concatenate([part for j in near for part in station[j]]):
+                of_directors += [(3 * (i % self._count) + c, row, raised.first + 3 * slot + c) for c in range(3)]
+        self._of_directors = [of.copy() for of in np.array(of_directors, dtype=np.int64).reshape(-1, 3).T]
         self._from, self._row, self._column = (of.copy() for of in np.array(entries, dtype=np.int64).T)
 
     def write(self, again: StepAgain, n: int) -> None:
@@ -128,9 +138,9 @@ class Followed:
             matrices = self._change, maps.lacking, maps.by_origin, maps.slides
             differentiate_friction(problem, at, again.spare, stage, _rounded(h), *matrices)
         if rubbing or self._otherwise:
-            by_place, by_origin = self._by_differences(again, at, rubbing)
-            append(maps.lacking, by_place)
-            append(maps.by_origin, by_origin)
+            found = self._by_differences(again, at, rubbing)
+            for matrix, entries in zip((maps.lacking, maps.by_origin, maps.by_strain), found, strict=True):
+                append(matrix, entries)
         return self._drag or sliding or rubbing or self._otherwise
 
     @staticmethod
@@ -145,8 +155,8 @@ class Followed:
                 shape = again.size, 6 * len(rows)
                 append(again.maps.slides, Entries(rows[f, 3:], np.full(3, 6 * f + c), value, shape))
 
-    def _by_differences(self, again: StepAgain, at: Configuration, rubbing: bool) -> tuple[Entries, Entries]:
-        """Return both for forces without elements of their own, by differences."""
+    def _by_differences(self, again: StepAgain, at: Configuration, rubbing: bool) -> tuple[Entries, ...]:
+        """Return them for forces without elements of their own, and by strains at the origin, by differences."""
         problem, stage = again.problem, again.stage
         h, alone = 0.1 * FINE * self._shortest, np.zeros(0, dtype=np.int64)
         if rubbing:
@@ -170,9 +180,27 @@ class Followed:
         rods = len(found.by_origin)
         by_place = self._entries(found.by_place[:rods], colours, apart)
         by_place = by_place.beside(found.by_place[rods:], again.of_bodies.ravel())
-        return by_place, self._entries(found.by_origin, colours, apart)
+        by_strain = self._by_director(again, found.by_director, edges)
+        return by_place, self._entries(found.by_origin, colours, apart), by_strain
 
-    def _differences(self, again: StepAgain, colour: Array, edge_colour: Array) -> Differences:
+    def _by_director(self, again: StepAgain, rows: Array, edges: Array) -> Entries:
+        """Return differences by directors of raised edges as a matrix; some edges changed apart from others."""
+        raised, size = again.problem.raised, again.size
+        if not self._raised:
+            nothing = np.zeros(0, dtype=np.int64)
+            return Entries(nothing, nothing, np.zeros(0), (size, again.stage.origin_strain.size))
+        place, row, column = self._of_directors
+        alone = np.flatnonzero(np.isin(raised.edge, edges))
+        value = rows[place, row]
+        of_alone = (raised.first + 3 * raised.slot[alone, None] + np.arange(3)).ravel()
+        value[np.isin(column, of_alone)] = 0.0
+        own = 3 * (self._count + np.searchsorted(edges, raised.edge[alone]))[:, None] + np.arange(3)
+        found = Entries(row, column, value, (size, again.stage.origin_strain.size))
+        return found.beside(rows[own.ravel()], of_alone)
+
+    def _differences(
+        self, again: StepAgain, colour: Array, edge_colour: Array, width: int | None = None
+    ) -> Differences:
         """Return arrays for differences by unknowns of these colours."""
         colours = max(self._count, int(colour.max()) + 1)
         rows = colours * len(self._ways) + (max(self._count, int(edge_colour.max()) + 1) if self._turns else 0)
@@ -182,8 +210,9 @@ class Followed:
             ways=self._ways,
             node_colour=colour,
             edge_colour=edge_colour,
-            by_place=np.zeros((rows + bodies, again.size)),
+            by_place=np.zeros((rows + bodies, width or again.size)),
             by_origin=np.zeros((rows, again.size)),
+            by_director=np.zeros((3 * (int(edge_colour.max()) + 1) if self._raised else 0, again.size)),
             pressing=self._pressing,
             following=self._following,
         )
@@ -195,11 +224,7 @@ class Followed:
 
     def _entries(self, rows: Array, colours: int, apart: tuple[Array, Array]) -> Entries:
         """Return differences as a matrix, with columns of nodes and of edges that changed apart from others."""
-        size, ways = rows.shape[1], self._ways
-        of_nodes = rows[: colours * len(ways)].reshape(colours, len(ways), size)
-        of_nodes = (ways.T @ of_nodes).reshape(3 * colours, size)
-        of_edges = rows[colours * len(ways) :]
-        columns = np.concatenate([of_nodes[: 3 * self._count], of_edges[: self._count]])
+        columns, of_nodes, of_edges = self._columns(rows, colours)
         value = columns[self._from, self._row]
         if not len(apart[0]):
             return self._filled(value)
@@ -207,29 +232,59 @@ class Followed:
         found = self._filled(value)
         return found.beside(of_nodes[3 * self._count :], apart[0]).beside(of_edges[self._count :], apart[1])
 
+    def _columns(self, rows: Array, colours: int) -> tuple[Array, Array, Array]:
+        """Return differences by the colours of nodes along axes and by those of edges: of unknowns that change
+        together, and of all nodes, and of all edges.
+        """
+        size, ways = rows.shape[1], self._ways
+        of_nodes = rows[: colours * len(ways)].reshape(colours, len(ways), size)
+        of_nodes = (ways.T @ of_nodes).reshape(3 * colours, size)
+        of_edges = rows[colours * len(ways) :]
+        return np.concatenate([of_nodes[: 3 * self._count], of_edges[: self._count]]), of_nodes, of_edges
+
     def _filled(self, value: Array) -> Entries:
         """Return the matrix with entries that are not 0."""
         kept = np.flatnonzero(value)
         return Entries(self._row[kept], self._column[kept], value[kept], self._shape)
 
-    def most_entries(self, again: StepAgain) -> int:
-        """Return how many entries the first matrix of `momentum` has at most."""
-        return len(self._row) + again.of_bodies.size * again.size
-
-    def momentum(self, again: StepAgain, at: Configuration, velocity: Array) -> tuple[Entries, Entries]:
-        """Return how the fluid's momentum depends on a configuration and on velocities, shapes (size, size)."""
-        fluid, size, nodes = again.problem.fluid, again.size, again.of_nodes
-        fluid.node_velocity[:] = velocity
-        found = self._differences(again, self._colours, self._edge_colours)
+    def momentum(
+        self, again: StepAgain, at: Configuration, velocity: Array, director_rate: Array
+    ) -> tuple[Entries, Entries]:
+        """Return how the fluid's momentum depends on a configuration, and on velocities and rates of strains, shapes
+        (wet, size), (wet, size + n_strain).
+        """
+        fluid, raised, size, nodes = again.problem.fluid, again.problem.raised, again.size, again.of_nodes
+        fluid.node_velocity[:], fluid.director_rate[:] = velocity, director_rate
+        found = self._differences(again, self._colours, self._edge_colours, again.wet)
         differentiate_momentum(again.problem, found, at, again.spare, again.stage, 0.1 * FINE * self._shortest)
-        inertia = np.zeros((len(nodes), 3, 3))
+        first, second = (of[: len(fluid.mass), :, None] for of in (at.director1, at.director2))
+        halves = 0.5 * fluid.mass[:, 0, None, None] * first * first.swapaxes(1, 2)
+        halves += 0.5 * fluid.mass[:, 1, None, None] * second * second.swapaxes(1, 2)
+        off, count = np.flatnonzero(fluid.raised >= 0), again.stage.origin_strain.size
+        own = size + 3 * raised.slot[fluid.raised[off], None] + np.arange(3)
+        middle = fluid.middle[fluid.raised[off], None, None]
+        turning, lifted = own + raised.first, middle * halves[off]
+        parts = [(own, turning, 2.0 * middle * lifted)]
         for end in range(2):
-            for c, director in enumerate((at.director1, at.director2)):
-                m = director[: len(fluid.mass)]
-                halves = 0.5 * fluid.mass[:, c, None, None] * m[:, :, None] * m[:, None, :]
-                np.add.at(inertia, fluid.edge_node + end, halves)
-        row, column = (np.broadcast_to(of, inertia.shape).ravel() for of in (nodes[:, :, None], nodes[:, None, :]))
-        nothing = np.zeros(0, dtype=int), np.zeros(0, dtype=int)
+            node = nodes[fluid.edge_node + end]
+            parts += [(node, node, halves), (own, node[off], lifted), (node[off], turning, lifted)]
+        row = np.concatenate([np.repeat(of, 3, axis=1).ravel() for of, _, _ in parts])
+        column = np.concatenate([np.tile(of, 3).ravel() for _, of, _ in parts])
+        value = np.concatenate([of.ravel() for _, _, of in parts])
         rods, bodies = len(found.by_origin), again.of_bodies.ravel()
-        by_place = self._entries(found.by_place[:rods], self._count, nothing).beside(found.by_place[rods:], bodies)
-        return by_place, Entries(row, column, inertia.ravel(), (size, size))
+        columns = self._columns(found.by_place[:rods], self._count)[0]
+        places = np.concatenate([(self._from, self._row, self._column), self._of_kept(again)], axis=1)
+        by_place = Entries(places[1], places[2], columns[places[0], places[1]], (again.wet, size))
+        by_place = by_place.beside(found.by_place[rods:], bodies)
+        return by_place, Entries(row, column, value, (again.wet, size + count))
+
+    def _of_kept(self, again: StepAgain) -> Array:
+        """Return rows of differences, rows and columns of what momenta of kept directors depend on, shape (3, n)."""
+        raised, found = again.problem.raised, [(0, 0, 0)][:0]
+        for edge, slot in zip(raised.edge, raised.slot, strict=True):
+            i = self._first[edge]
+            for row in again.size + 3 * slot + np.arange(3):
+                found += [(3 * (j % self._count) + c, row, again.of_nodes[j, c]) for j in (i, i + 1) for c in range(3)]
+                if self._turns:
+                    found.append((3 * self._count + i % self._count, row, again.of_edges[edge]))
+        return np.array(found, dtype=np.int64).reshape(-1, 3).T

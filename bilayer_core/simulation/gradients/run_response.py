@@ -14,7 +14,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from bilayer_core.engine.steps_again import Reached
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.observed.frame import Description
 from bilayer_core.simulation.gains import put_gains
@@ -47,6 +46,7 @@ DIFFERENTIATED = {
     "loads",
     "barrier",
     "rod barrier",
+    "restitution",
     "gyroscopic",
     "body drag",
     "joints",
@@ -56,7 +56,7 @@ DIFFERENTIATED = {
 """Forces through which runs are differentiated."""
 SEEDS = ("positions", "velocities")
 """By which a derivative comes back from the end of a run."""
-AT_END = ("speed", "push", "strain_rate", "reached", "strain_push")
+AT_END = ("speed", "push", "strain_rate", "reached", "strain_push", "kept")
 """Rates that a number changes by itself at the end of a step."""
 FORGETS = 1e6
 """Lengths of the rod by which a derivative by a number, times its size, moves it."""
@@ -106,16 +106,11 @@ class RunResponse:
 
     def _refuse(self) -> None:
         """Refuse what is not differentiated, by its name."""
-        model = self.model
+        model, methods = self.model, self._stepper.engine.methods
         others = [name for name in model.forces if name not in DIFFERENTIATED]
         reasons = [f"the force {name!r}" for name in others]
-        if "added mass" in model.forces and self._stepper.engine.problem.raised.exists:
-            reasons.append("added mass of layers that are unlike")
-        if any(
-            len(method.couplings) > len(method.nodes) or method.couplings.shape[0] > method.couplings.shape[1]
-            for method in self._stepper.engine.methods
-        ):
-            reasons.append("an integrator whose steps end beyond their last stage")
+        if "added mass" in model.forces and any(len(m.couplings) > m.couplings.shape[1] for m in methods):
+            reasons.append("added mass with an integrator whose steps end beyond their last stage")
         problem = self._stepper.engine.problem
         if problem.light.exists:
             reasons.append("light")
@@ -155,7 +150,7 @@ class RunResponse:
         gain = np.stack([number.gain for number in numbers], axis=-1)
         for k, step in enumerate(self._course.steps(self._maker)):
             reached = rates.take(step)
-            self._note(step, reached)
+            self._note(step)
             direct = [self._varied.in_step(number, step, reached) for number in numbers]
             first = np.stack([number.first[k] for number in numbers], axis=-1)
             acts = Inputs(first, np.stack([number.stimulus[k] for number in numbers], axis=-1), gain)
@@ -172,9 +167,9 @@ class RunResponse:
             self._look_at(along, step, per, FORGETS)
         return along
 
-    def _note(self, step: KeptStep, reached: Sequence[Reached]) -> None:
+    def _note(self, step: KeptStep) -> None:
         """Note how far from the end of a step it ended now, and tell the first time that this is too far."""
-        left = float(np.abs(reached[-1].position - step.end.position).max())
+        left = float(np.abs(self._rates.ended - step.end.position).max())
         most = max(BESIDE * self._stepper.steps.newton_tolerance * step.length, LEAST * self._size)
         if left > most >= self._left:
             warnings.warn(
@@ -221,14 +216,14 @@ class RunResponse:
         given, tolerance = np.abs(back.place).max(), self._stepper.steps.newton_tolerance
         for n, step in enumerate(self._course.steps(self._maker, backward=True), 1):
             reached = rates.take(step)
-            self._note(step, reached)
+            self._note(step)
             end = back
             back, acts, direct = rates.backward(end)
             if given > 0.0:  # what Newton's method leaves then moves the end by more than the rod's length
                 self._look_at(back, step, given, self._size / (tolerance * step.length))
             for number, rates_at_starts in begun:
                 number.rates = rates_at_starts.pop()
-            first[-n], stimulus[-n, : len(reached)] = acts.first[:, 0], acts.stimulus[:, :, 0]
+            first[-n], stimulus[-n, : len(acts.stimulus)] = acts.first[:, 0], acts.stimulus[:, :, 0]
             gain += acts.gain[:, 0]
             for k, number in changing:
                 own = self._varied.in_step(number, step, reached)
@@ -291,6 +286,8 @@ class RunResponse:
         state.spin += way * along.speed[self._here.of_edges, k]
         if number.rates is None:
             state.strain_rate += way * along.strain_rate[:, k]
+        speeds = evaluator.speeds_of(state)
+        speeds += way * along.kept[:, k]
         state.transduction += way * along.reached[self._varied.modes(model), k]
         gains = model.drives.law_gain.copy()
         try:

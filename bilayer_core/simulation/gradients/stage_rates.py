@@ -14,15 +14,16 @@ import numpy as np
 from bilayer_core.engine.body_maps import BodyMaps
 from bilayer_core.engine.gradient_differences import StrainDifferences
 from bilayer_core.engine.linear.lacking_matrix import LackingMatrix
-from bilayer_core.engine.stage_maps import differentiate_turns
+from bilayer_core.engine.stage_maps import differentiate_turns, write_last_way
 from bilayer_core.engine.step_response import ElasticMaps, FluidMap, StepConstants, StrainMap, write_directors
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration
-from bilayer_core.scene.transduction import lagged
 from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.followed import Followed, append
+from bilayer_core.simulation.gradients.impact_rates import by_impacts, slopes_of_gaps
 from bilayer_core.simulation.gradients.mechanism_rates import resistances, slopes_of_motions
 from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
+from bilayer_core.simulation.gradients.transduction_rates import lags
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -78,7 +79,9 @@ class Constants:
         free[(problem.constrained.unknown[:, None] + np.arange(3)).ravel()] = 0.0
         prescribed = problem.constrained.free < 0
         moves[(problem.constrained.unknown[prescribed, None] + np.arange(3)).ravel()] = 0.0
-        self.moves = moves[:, None]
+        self.moves, gaps = moves[:, None], problem.restitution
+        self.of_gaps = slice(gaps.first, gaps.first + len(gaps.rate))
+        self.raised_rows = problem.raised.first + 3 * problem.raised.slot[:, None] + np.arange(3)
         self.colour, self.colours, self.seen = self._colours(again)
         drives = problem.drives
         rows = np.repeat(np.arange(len(drives.law_gain)), np.diff(drives.law_first))
@@ -214,10 +217,10 @@ class StageRates:
         problem, stages = again.problem, len(again.guesses)
         strains, laws = constants.strains, len(again.laws)
         bodies, held = len(problem.bodies.mass), len(problem.constrained.node)
-        wet = follower.most_entries(again) if again.wet else 0
+        wet = again.wet and (again.wet + 64) * (bodies * 6 + 64)
         self.elastic = ElasticMaps(
             strains=StrainMap(viscous=_list(entries), directors=np.zeros((len(problem.raised.edge), 3, 7))),
-            fluid=FluidMap(by_place=_list(wet), by_speed=_list(9 * len(again.of_nodes) if wet else 0)),
+            fluid=FluidMap(by_place=_list(wet), by_speed=_list(wet)),
             resistance=np.zeros(strains),
             by_law=np.zeros((laws, again.size)),
             law_slope=np.zeros(laws),
@@ -243,10 +246,10 @@ class StageDerivatives:
         again = agains[0]
         self.constants = Constants(model, again)
         self.follower = Followed(model, again)
-        self._resisted = "joint friction" in model.forces
+        self._resisted, self._damped = "joint friction" in model.forces, "restitution" in model.forces
         apart = self.constants.apart
         entries = len(self.constants.seen[0]) if apart is None else apart.nnz * again.size
-        entries += 12 * len(again.problem.mechanisms.slides)
+        entries += 12 * (len(again.problem.mechanisms.slides) + len(again.problem.restitution.rate))
         self.stages = [StageRates(self.constants, self.follower, of, entries) for of in agains]
         self.start = StageRates(self.constants, self.follower, again, entries)
 
@@ -254,7 +257,8 @@ class StageDerivatives:
         """Write the maps of the start of a step."""
         self._write_strains(again, again.places[0], self.start)
         if again.wet:
-            self._write_momentum(again, again.places[0], step.start.velocity, self.start)
+            rates = step.start.strain_rate[self.constants.raised_rows]
+            self._write_momentum(again, again.places[0], step.start.velocity, rates, self.start)
 
     def _write_strains(self, again: StepAgain, at: Configuration, found: StageRates) -> None:
         """Write ∂σ/∂q at a configuration."""
@@ -262,6 +266,8 @@ class StageDerivatives:
         strains.viscous.count[0] = 0
         if self._resisted:
             append(strains.viscous, slopes_of_motions(again, at))
+        if self._damped:
+            append(strains.viscous, slopes_of_gaps(again, at))
         if constants.colours:
             again.differentiate_by_strains(at, found.differences, STRAIN)
             which, seen = constants.seen
@@ -269,9 +275,11 @@ class StageDerivatives:
             append(strains.viscous, constants.strains_of(which, seen, value))
         write_directors(again.problem, at, strains)
 
-    def _write_momentum(self, again: StepAgain, at: Configuration, velocity: Array, found: StageRates) -> None:
+    def _write_momentum(
+        self, again: StepAgain, at: Configuration, velocity: Array, director_rate: Array, found: StageRates
+    ) -> None:
         """Write how the fluid's momentum depends on a configuration and on velocities."""
-        by_place, by_speed = self.follower.momentum(again, at, velocity)
+        by_place, by_speed = self.follower.momentum(again, at, velocity, director_rate)
         _put(found.elastic.fluid.by_place, by_place)
         _put(found.elastic.fluid.by_speed, by_speed)
 
@@ -284,16 +292,24 @@ class StageDerivatives:
         again.write_body_maps(n, found.bodies)
         if self._resisted:
             found.elastic.resistance[:] = resistances(again)
-        while self.constants.in_space:
-            differentiate_turns(again.problem, again.maps, again.places[n], again.guesses[n], at, stage, again.lacks)
-            again.lacks = True
+        if again.wet:
+            raised, velocity = again.problem.raised, (at.position - stage.origin_position) / stage.length
+            turned = at.director1[raised.edge] - stage.origin_strain[self.constants.raised_rows]
+            self._write_momentum(again, at, velocity, turned / stage.length, found)
+            again.follow(at)
+        while True:
+            if self.constants.in_space:
+                ways = again.places[n], again.guesses[n], at, stage
+                differentiate_turns(again.problem, again.maps, *ways, again.lacks)
+                again.lacks = True
+            if self._damped:
+                for matrix, entries in zip(
+                    (again.maps.by_strain, again.maps.by_kept), by_impacts(again, at), strict=True
+                ):
+                    append(matrix, entries)
             if not again.overfull:
                 break
             self.follower.write(again, n)
-        if again.wet:
-            velocity = (at.position - stage.origin_position) / stage.length
-            self._write_momentum(again, at, velocity, found)
-            again.follow(at)
         drives, laws, elastic, followed = (
             again.problem.drives,
             again.laws,
@@ -304,17 +320,11 @@ class StageDerivatives:
             slope = 1.0 - (laws / drives.law_saturation) ** 2
             elastic.law_slope[:] = slope * drives.law_gain
             elastic.law_by_gain[:] = slope * (followed @ again.transduction - drives.law_reference)
-        elastic.lag[:] = self._lag(again, n, step)
+        elastic.lag[:] = lags(again, n, step, self.constants.record.channel)
 
-    def _lag(self, again: StepAgain, n: int, step: KeptStep) -> Array:
-        """Return what each mode takes of what it had reached, of the first stimulus and of that of the stage."""
-        drives, inputs, state = again.problem.drives, again.inputs, step.start
-        found = np.zeros((3, len(self.constants.record.channel)))
-        for m, channel in enumerate(self.constants.record.channel):
-            own = state.transduction[m], inputs.first[channel], inputs.stimulus[n, channel]
-            lags = float(drives.mode_rising[m]), float(drives.mode_falling[m])
-            lag = lags[0] if own[2] > own[0] else lags[1]  # on either side of it
-            for k in range(3):
-                unit = [float(j == k) for j in range(3)]
-                found[k, m] = lagged(*unit, lag, lag, float(inputs.elapsed[n]))
-        return found
+    def write_beyond(self, again: StepAgain, n: int, step: KeptStep) -> None:
+        """Write the maps of the end of a step beyond its last stage, its point n."""
+        found, at = self.stages[n], again.places[n + 1]
+        again.write_body_maps(n, found.bodies)
+        write_last_way(again.problem, again.maps, again.places[n], at)
+        found.elastic.lag[:] = lags(again, n, step, self.constants.record.channel)

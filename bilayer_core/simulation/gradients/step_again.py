@@ -18,6 +18,7 @@ from bilayer_core.engine.gradient_differences import StrainDifferences, differen
 from bilayer_core.engine.linear.krylov_solution import Lack
 from bilayer_core.engine.linear.lacking_matrix import LackingMatrix
 from bilayer_core.engine.stage_maps import StageMaps
+from bilayer_core.engine.step import move_beyond
 from bilayer_core.engine.step_ends import end_stage
 from bilayer_core.engine.steps_again import (
     Reached,
@@ -79,6 +80,12 @@ class KeptStep:
         """Duration [s]."""
         return float(self.end.time[0]) - self.begin
 
+    @property
+    def beyond(self) -> bool:
+        """Whether it ends beyond its last stage."""
+        points, stages = self.method.couplings.shape
+        return points > stages
+
 
 class StepAgain(Evaluator):
     """Makes kept steps again.
@@ -93,7 +100,7 @@ class StepAgain(Evaluator):
     same : float
         Two times that differ by no more are one [s].
     stages : int
-        Of a step, at most.
+        Of a step, at most, its end counted where that is beyond the last one.
     history : bool
         Whether the integrator keeps stage derivatives.
     tolerance : float
@@ -102,13 +109,15 @@ class StepAgain(Evaluator):
     Attributes
     ----------
     places : list of Configuration
-        The start of the step, then the end of each stage.
+        The start of the step, then the end of each stage, and of a step that ends beyond its last one.
     guesses : list of Configuration
         Where Newton's method began in each stage.
     reached : Reached
         Where the stage ended that was found last.
+    ended, last : Point, Configuration
+        The end of the last stage, or of the step where that is beyond it.
     size, wet : int
-        Of unknowns, and of the fluid's momentum in their places.
+        Of unknowns, and of the fluid's momentum: in their places, then of kept directors.
     """
 
     def __init__(
@@ -140,6 +149,7 @@ class StepAgain(Evaluator):
         self._size = max(rod.path.length for rod in model.scene.rods)
         self._tolerance = tolerance
         self._settles = not {"friction", "rod friction"}.isdisjoint(model.forces)
+        self.ended, self.last = self._work.end, self.places[0]
         self._elastic = [name for name in ELASTIC if name in model.forces]
         layout = self.problem.strands
         self.of_nodes = layout.node_unknown[:, None] + np.arange(3)
@@ -147,7 +157,8 @@ class StepAgain(Evaluator):
         self._rods = len(self.sums.gradient)
         self.size = self._rods + 6 * bodies
         self.of_bodies = self._rods + np.arange(6 * bodies).reshape(bodies, 6)
-        self.wet = self.size if self.problem.fluid.exists else 0
+        fluid = self.problem.fluid
+        self.wet = self.size + 3 * (len(fluid.momentum) - model.node_count) if fluid.exists else 0
         self._room = 0
         self.lacks = False
         self.grow_maps(256)
@@ -176,6 +187,8 @@ class StepAgain(Evaluator):
                 by_origin=matrix(2 * reach + 1),
                 by_turn=np.zeros(edges),
                 slides=matrix(0),
+                by_strain=matrix(0),
+                by_kept=matrix(0),
                 by_director=np.zeros((len(problem.raised.edge), 7, 3)),
                 way=np.zeros((3, edges, 3)),
                 edge_of=edge_of,
@@ -195,7 +208,9 @@ class StepAgain(Evaluator):
     @property
     def overfull(self) -> bool:
         """Whether there was too little room for entries of maps; now there is more, and maps are zero."""
-        most = max(int(of.count[0]) for of in (self.maps.lacking, self.maps.by_origin, self.maps.slides))
+        maps = self.maps
+        lists = maps.lacking, maps.by_origin, maps.slides, maps.by_strain, maps.by_kept
+        most = max(int(of.count[0]) for of in lists)
         if most > self._room:
             self.grow_maps(2 * most)
             return True
@@ -228,7 +243,18 @@ class StepAgain(Evaluator):
     @property
     def end_rates(self) -> Array:
         """Rates of strains at the end of the stage, shape (n_strain,)."""
-        return self._work.end.strain_rate
+        return self.ended.strain_rate
+
+    @property
+    def speeds(self) -> Array:
+        """Speeds of approach that are in memory during the step, shape (n_pair,)."""
+        return self.speeds_of(self._state)
+
+    def speeds_of(self, state: State) -> Array:
+        """Return the speeds of approach in the memory of a state, shape (n_pair,)."""
+        restitution = self.problem.restitution
+        first = restitution.memory[0] if restitution.exists else 0
+        return state.memory[first : first + len(restitution.rate)]
 
     @property
     def held(self) -> Array:
@@ -239,30 +265,34 @@ class StepAgain(Evaluator):
     @property
     def speeds_of_held(self) -> Array:
         """Velocities of these at the end of the stage, and what they gain by its length, shape (2, n_held, 3)."""
-        constrained, work = self.problem.constrained, self._work
-        gained = (work.end.velocity - work.origin.velocity) / self.stage.momentum_length
-        return np.stack([work.end.velocity, gained])[:, constrained.node[constrained.free >= 0]]
+        constrained, velocity = self.problem.constrained, self.ended.velocity
+        gained = (velocity - self.point.velocity) / self.stage.momentum_length
+        return np.stack([velocity, gained])[:, constrained.node[constrained.free >= 0]]
 
     @property
     def momenta_of_bodies(self) -> Array:
         """Angular momenta of free bodies at the end of the stage, and what they gain by its length, shape (2, n_free,
         3).
         """
-        end, origin = self._work.end.angular_momentum, self._work.origin.angular_momentum
+        end, origin = self.ended.angular_momentum, self.point.angular_momentum
         return np.stack([end, (end - origin) / self.stage.momentum_length])
 
     @property
     def gained_momentum(self) -> Array:
         """Gain of the fluid's momentum over the stage, shape (wet,)."""
-        gained = np.zeros(self.wet)
+        return self.wetted(self.ended.fluid_momentum - self.point.fluid_momentum)
+
+    def wetted(self, rows: Array) -> Array:
+        """Return what the fluid has about nodes and kept directors, shape (n, 3), in the places of its momenta."""
+        found, nodes = np.zeros(self.wet), len(self.of_nodes)
         if self.wet:
-            gained[self.of_nodes] = self._work.end.fluid_momentum - self._work.origin.fluid_momentum
-        return gained
+            found[self.of_nodes], found[self.size :] = rows[:nodes], rows[nodes:].ravel()
+        return found
 
     @property
     def origin_rates(self) -> Array:
         """Rates of strains at its origin, likewise."""
-        return self._work.origin.strain_rate
+        return self.point.strain_rate
 
     def start(self, n: int) -> None:
         """Start stage n, up to the first guess."""
@@ -314,6 +344,15 @@ class StepAgain(Evaluator):
         end_stage(self.problem, self._arrays, work, self._inputs, n, at)
         work.start_angle[:] = work.end.angle
         at.total_angle[:] = 0.0
+        self.ended, self.last = work.end, at
+
+    def go_beyond(self, n: int) -> None:
+        """Go from the end of the last stage to that of the step, its point n."""
+        step, places = self._step, (self.places[n], self.places[n + 1])
+        status = move_beyond(self.problem, self._arrays, step.method, self._inputs, self._work, n, *places)
+        if status != READY:
+            raise SimulationError("gradient: a step that was made is not possible once more", step.begin)
+        self.ended, self.last = self.point, places[1]
 
     def gradient(self, n: int) -> Array:
         """Return the gradient of the potential where stage n ended, shape (size,)."""

@@ -12,14 +12,17 @@ from bilayer_core.engine.step_response import (
     StateRates,
     StepWork,
     begin_backward,
+    begin_backward_beyond,
     begin_forward,
     end_backward,
     end_forward,
+    end_forward_beyond,
     go_backward,
     go_forward,
 )
 from bilayer_core.engine.steps_again import Reached
 from bilayer_core.model.model import Model
+from bilayer_core.simulation.gradients.impact_rates import speeds_at_end
 from bilayer_core.simulation.gradients.stage_rates import StageDerivatives
 from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
 
@@ -42,6 +45,8 @@ class Rates:
         What modes have reached of stimuli, shape (n_mode, n).
     push, strain_push : ndarray
         Rates of velocities, and of rates of strains and of the fluid's momentum, that a history keeps, likewise.
+    kept : ndarray
+        Speeds of approach in the memory of impacts, shape (n_kept, n).
     """
 
     place: Array
@@ -50,12 +55,13 @@ class Rates:
     reached: Array
     push: Array
     strain_push: Array
+    kept: Array
 
     @classmethod
     def zeros(cls, again: StepAgain, columns: int) -> Rates:
         """Return rates of a model without any."""
         strains, modes = again.stage.origin_strain.size, again.transduction.size
-        sizes = again.size, again.size, strains, modes, again.size, strains + again.wet
+        sizes = again.size, again.size, strains, modes, again.size, strains + again.wet, len(again.speeds)
         return cls(*(np.zeros((size, columns)) for size in sizes))
 
 
@@ -124,11 +130,9 @@ class StepRates:
 
     def take(self, step: KeptStep) -> list[Reached]:
         """Go to a step; return where its stages ended."""
-        self.step, self._count, reached = step, len(step.method.couplings), []
+        self.step, self._count, reached = step, step.method.couplings.shape[1], []
         for n, again in enumerate(self._agains[: self._count]):
-            again.begin(step)
-            for earlier in range(n):
-                again.pass_through(earlier, self._agains[earlier].places[earlier + 1])
+            self._begin(again, n)
             again.start(n)
             if n == 0:
                 self._of.write_start(again, step)
@@ -136,12 +140,34 @@ class StepRates:
             reached.append(place)
             self.residual = max(self.residual, correction / step.length)
             self._of.write(again, n, step)
+        self.ended, again = reached[-1].position, self._agains[self._count - 1]
+        if step.beyond:
+            again = self._agains[self._count]
+            self._begin(again, self._count)
+            again.go_beyond(self._count)
+            self.ended = again.places[self._count + 1].position
+            self._of.write_beyond(again, self._count, step)
+        elif len(again.speeds):
+            again.finish(self._count - 1)
+        _, *self._remembered = speeds_at_end(again)
         return reached
+
+    def _begin(self, again: StepAgain, n: int) -> None:
+        """Go to the start of stage n."""
+        again.begin(self.step)
+        for earlier in range(n):
+            again.pass_through(earlier, self._agains[earlier].places[earlier + 1])
 
     def _stage(self, n: int) -> tuple:
         """Return what pieces take of stage n."""
         again, of = self._agains[n], self._of.stages[n]
         at = again.problem, again.places[n + 1], again.stage, self.step.method, again.lack, again.lacks
+        return *at, self.constants.record, again.maps, of.elastic, of.bodies
+
+    def _beyond(self) -> tuple:
+        """Return what pieces take of the end of the step beyond its last stage."""
+        n, again, of = self._count, self._agains[self._count], self._of.stages[self._count]
+        at = again.problem, again.places[n + 1], self.step.method
         return *at, self.constants.record, again.maps, of.elastic, of.bodies
 
     def forward(self, start: Rates, acts: Inputs, direct: Sequence[Array] | None = None) -> Rates:
@@ -155,28 +181,29 @@ class StepRates:
         direct : sequence of ndarray, optional
             Of the gradient at the ends of stages by parameters alone, each of shape (size, n).
         """
-        end, own, work, last = (
-            Rates.zeros(self._agains[0], start.place.shape[1]),
-            self._acts,
-            self._work,
-            self._count - 1,
-        )
+        columns, own, work, last = start.place.shape[1], self._acts, self._work, self._count - 1
         again, method, first = self._agains[last], self.step.method, self._of.start.elastic
+        points, end = len(method.couplings), Rates.zeros(again, columns)
         own.direct[:] = 0.0
-        for k in range(start.place.shape[1]):
+        for k in range(columns):
             for part in fields(Rates):
                 getattr(self._start, part.name)[:] = getattr(start, part.name)[:, k]
             own.first[:], own.gain[:] = acts.first[:, k], acts.gain[:, k]
-            own.stimulus[: self._count] = acts.stimulus[: self._count, :, k]
+            own.stimulus[:points] = acts.stimulus[:points, :, k]
             for n, of in enumerate(direct or ()):
                 own.direct[n] = of[:, k]
             constants = self.constants.record
             begin_forward(again.problem, method, constants, first.strains, first.fluid, self._start, work)
             for n in range(self._count):
                 go_forward(*self._stage(n), self._start, own, work, n, self.step.length)
-            end_forward(again.problem, again.stage, method, self._end, work, last)
+            if self.step.beyond:
+                end_forward_beyond(*self._beyond(), self._start, self._end, own, work, self._count)
+            else:
+                end_forward(again.problem, again.stage, method, self._end, work, last)
             for part in fields(Rates):
                 getattr(end, part.name)[:, k] = getattr(self._end, part.name)
+        by_kept, by_rate = self._remembered
+        end.kept = by_kept[:, None] * start.kept + by_rate[:, None] * end.strain_rate[self.constants.of_gaps]
         return end
 
     def backward(self, end: Rates) -> tuple[Rates, Inputs, list[Array]]:
@@ -187,10 +214,16 @@ class StepRates:
         again, method, first = self._agains[last], self.step.method, self._of.start.elastic
         for part in fields(Rates):
             getattr(self._end, part.name)[:] = getattr(end, part.name)[:, 0]
-        begin_backward(again.problem, again.stage, method, self._end, self._start, acts, work, last)
+        by_kept, by_rate = self._remembered
+        self._end.strain_rate[self.constants.of_gaps] += by_rate * self._end.kept
+        if self.step.beyond:
+            begin_backward_beyond(*self._beyond(), self._end, self._start, acts, work, self._count)
+        else:
+            begin_backward(again.problem, again.stage, method, self._end, self._start, acts, work, last)
         for n in reversed(range(self._count)):
             go_backward(*self._stage(n), self._end, self._start, acts, work, n, self.step.length)
         end_backward(again.problem, self.constants.record, first.strains, first.fluid, self._start, work)
+        self._start.kept[:] += by_kept * self._end.kept
         start = Rates(*(getattr(self._start, part.name)[:, None].copy() for part in fields(Rates)))
-        inputs = Inputs(acts.first[:, None], acts.stimulus[: self._count, :, None], acts.gain[:, None])
-        return start, inputs, [of[:, None] for of in acts.direct]
+        inputs = Inputs(acts.first[:, None], acts.stimulus[: len(method.couplings), :, None], acts.gain[:, None])
+        return start, inputs, [of[:, None] for of in acts.direct[: self._count]]

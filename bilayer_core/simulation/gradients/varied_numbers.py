@@ -21,6 +21,7 @@ from bilayer_core.model.state import PARTS, State
 from bilayer_core.observed.frame import Description
 from bilayer_core.simulation.gradients.course import Course
 from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
+from bilayer_core.simulation.gradients.impact_rates import speeds_at_end
 from bilayer_core.simulation.gradients.nearby import (
     PLACES,
     Builders,
@@ -55,6 +56,7 @@ class Direct:
     strain_rate: Array
     reached: Array
     strain_push: Array
+    kept: Array
     next_rates: list[tuple[Array, Array]] | None = None
 
 
@@ -211,7 +213,8 @@ class VariedNumbers:
             raised = [of.problem.raised.edge for of in (found.agains[0], self.here)]
             if found.agains[0].end_rates.size != self.here.end_rates.size or not np.array_equal(*raised):
                 states = [self._builders.state_of(again.model) for again in found.agains]
-                found.rates = [(state.strain_rate, state.strain_acceleration) for state in states]
+                wet = np.zeros(found.agains[0].wet)
+                found.rates = [(of.strain_rate, np.concatenate([of.strain_acceleration, wet])) for of in states]
         for again in found.agains:
             refuse_other_plane(self.model, again.model, path, moves=False)
         if any(
@@ -326,6 +329,7 @@ class VariedNumbers:
             np.zeros(here.end_rates.size),
             np.zeros(here.transduction.size),
             np.zeros(here.end_rates.size + here.wet),
+            np.zeros(len(here.speeds)),
         )
         if number.agains:
             own = number.rates or [None] * len(number.agains)
@@ -333,7 +337,7 @@ class VariedNumbers:
                 self._replayed(again, replace(step, start=self.fitted(again, step.start, rates)), reached)
                 for again, rates in zip(number.agains, own, strict=True)
             ]
-            *found.gradient, held, momenta, reached_by, rates, push = (
+            *found.gradient, found.kept, held, momenta, reached_by, rates, push = (
                 slope(values, h) for values in zip(*seen, strict=True)
             )
             for rows, (speed, gained) in ((here.held, held), (here.of_bodies[:, 3:], momenta)):
@@ -346,6 +350,9 @@ class VariedNumbers:
                 found.strain_rate, found.strain_push = rates, push
             else:
                 found.next_rates = [(values[-2], values[-1]) for values in seen]
+                if here.wet:
+                    first, own = here.end_rates.size, number.agains[0].end_rates.size
+                    found.strain_push[first : first + here.size] = push[own : own + here.size]
         return found
 
     def _replayed(self, again: StepAgain, step: KeptStep, reached: Sequence[Reached]) -> list[Array]:
@@ -357,15 +364,19 @@ class VariedNumbers:
             again.go(n, place)
             gradients.append(again.gradient(n))
             again.finish(n)
+        if step.beyond:
+            again.go_beyond(len(reached))
         carry = step.method.carry
         push = (again.end_rates - again.origin_rates) / again.stage.momentum_length
-        of_fluid = again.gained_momentum / (again.stage.momentum_length * (1.0 - carry))
+        of_fluid = again.gained_momentum / again.stage.momentum_length
         if self._history:
             push = (push - carry * step.start.strain_acceleration) / (1.0 - carry)
+            of_fluid = (of_fluid - carry * again.wetted(step.start.fluid_force)) / (1.0 - carry)
             if not step.method.history:
                 push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
         return [
             *gradients,
+            speeds_at_end(again)[0],
             again.speeds_of_held,
             again.momenta_of_bodies,
             again.transduction.copy(),
@@ -394,7 +405,10 @@ class VariedNumbers:
         if rates is not None:
             fitted.strain_rate[:] = rates[0]
             if self._history:
-                fitted.strain_acceleration[:] = rates[1]
+                strains, nodes = len(rates[0]), len(state.fluid_force)
+                fitted.strain_acceleration[:] = rates[1][:strains]
+                fitted.fluid_force[:nodes] = state.fluid_force
+                fitted.fluid_force[nodes:] = rates[1][strains + again.size :].reshape(-1, 3)
         again.begin(KeptStep(fitted, fitted, self._stepper.engine.methods[0]))
         moved, constrained = again.problem.bodies.prescribed, again.problem.constrained
         moved = moved[moved < len(fitted.body_position)]
