@@ -37,10 +37,10 @@ def freeze_again(sliding, p, at, stage, k, slot, place, places):
     return found
 
 
-@piece(int, Sliding, Problem, Configuration, Stage, int, int, int, float, FrozenChange)
-def note_frozen(sliding, p, at, stage, slot, place, places, factor, change):
+@piece(int, Sliding, Problem, Configuration, Stage, int, int, int, float, FrozenChange, int)
+def note_frozen(sliding, p, at, stage, slot, place, places, factor, change, first):
     """Add a multiple of what a contact and its places took where they were frozen last."""
-    add_frozen(sliding, p, at, stage, slot, place, places, factor, change)
+    add_frozen(sliding, p, at, stage, slot, place, places, factor, change, first)
     return READY
 
 
@@ -167,8 +167,8 @@ def _free_of(surfaces, b):
     return surfaces.free_index[b] if b >= 0 and surfaces.free_index.shape[0] > 0 else -1
 
 
-@piece(int, Sliding, Problem, Configuration, Stage, int, int, int, FrozenChange, LackingMatrix, int, int)
-def write_change(sliding, p, at, stage, slot, place, places, change, matrix, column, w):
+@piece(int, Sliding, Problem, Configuration, Stage, int, int, int, FrozenChange, int, LackingMatrix, int, int)
+def write_change(sliding, p, at, stage, slot, place, places, change, first, matrix, column, w):
     """Add the forces that a change of a contact makes, by the unknowns that they act on, to a column of a matrix, or
     along way w to the three of a node.
     """
@@ -181,11 +181,10 @@ def write_change(sliding, p, at, stage, slot, place, places, change, matrix, col
         of_bodies[0, c] = of_bodies[1, c] = 0.0
     for q in range(places + 1):
         k = slot if q == 0 else place + q - 1
-        add_changed_force(sliding, p, at, stage, k, q, change, of_node, of_arms, of_bodies)
+        add_changed_force(sliding, p, at, stage, k, first + q, change, of_node, of_arms, of_bodies)
     surfaces, strands, i = p.surfaces, p.strands, sliding.node[slot]
     a, b = surfaces.contact_point_body[sliding.first[slot]], surfaces.body[sliding.surface[slot]]
-    first = 0 if a < 0 else 17
-    for k in range(first, 29):  # the node, two edges with two nodes and a turn each, two bodies
+    for k in range(0 if a < 0 else 17, 29):  # the node, two edges with two nodes and a turn each, two bodies
         row_, value = -1, 0.0
         if k < 3:
             row_, value = strands.node_unknown[i] + k, of_node[k]
@@ -200,8 +199,12 @@ def write_change(sliding, p, at, stage, slot, place, places, change, matrix, col
             f = _free_of(surfaces, a if side == 0 else b)
             if f >= 0:
                 row_, value = p.sums.gradient.shape[0] + 6 * f + c, of_bodies[side, c]
-        for c in range(0 if row_ < 0 else 1 if w < 0 else 3):
-            add_entry(matrix, row_, column + c, value * (1.0 if w < 0 else strands.axes[w, c]))
+        if value == 0.0:
+            continue
+        for c in range(1 if w < 0 else 3):
+            part = value if w < 0 else value * strands.axes[w, c]
+            if part != 0.0:
+                add_entry(matrix, row_, column + c, part)
     return READY
 
 
@@ -214,61 +217,105 @@ def _take_pose(sliding, at, stage, b):
 
 
 @kernel
+def _slip_by_origin(sliding, surfaces, strands, k, n, x, y, z, e, change, first):
+    """Note how a contact slips with the place of node n at the origin along a way, or with the turn there of edge e, if
+    that is not −1; nothing that it freezes changes.
+    """
+    begin_change(change, first, 0)
+    if e < 0 and n == sliding.node[k]:
+        change.slip[first, 0], change.slip[first, 1], change.slip[first, 2] = -x, -y, -z
+    rate = sliding.arm_rate
+    for side in range(2):
+        own = surfaces.node_edges[sliding.node[k], side]
+        for c in range(3):
+            r, m = 4 * side, strands.edge_node[own]
+            moved = rate[k, c, r] * x + rate[k, c, r + 1] * y + rate[k, c, r + 2] * z
+            if e == own:
+                change.slip[first, c] -= rate[k, c, r + 3]
+            elif e < 0 and m == n:
+                change.slip[first, c] += moved
+            elif e < 0 and m + 1 == n:
+                change.slip[first, c] -= moved
+
+
+@kernel
+def _end_of(strands, e0, e1, pick):
+    """Return one of the nodes of two edges, −1 for one that was returned before."""
+    first = strands.edge_node[e0]
+    n = first + pick if pick < 2 else strands.edge_node[e1] + pick - 2
+    return -1 if pick >= 2 and (n == first or n == first + 1) else n
+
+
+@kernel
 def _by_rod(sliding, p, at, trial, stage, h, k, slot, place, places, change, lacking, by_origin):
     """Differentiate a contact of a rod by nodes and turns of the edges at its node."""
     surfaces, strands, factor, ways = p.surfaces, p.strands, 1.0 / (2.0 * h), p.strands.axes
-    node, origin, origin_angle = sliding.node[slot], stage.origin_position, stage.origin_angle
+    node = sliding.node[slot]
     e0, e1 = surfaces.node_edges[node, 0], surfaces.node_edges[node, 1]
-    first, other = strands.edge_node[e0], strands.edge_node[e1]
-    for pick in range(2 if e0 == e1 else 4):
-        n = first + pick if pick < 2 else other + pick - 2
-        if pick >= 2 and (n == first or n == first + 1):
-            continue
-        for w in range(ways.shape[0]):
-            found, column = True, strands.node_unknown[n]
+    first, last, step = 0, ways.shape[0] if p.space.exists else 0, places + 1
+    for pick in range(4):
+        n = _end_of(strands, e0, e1, pick)
+        for w in range(ways.shape[0] if n >= 0 else 0):
             x, y, z = h * ways[w, 0], h * ways[w, 1], h * ways[w, 2]
-            begin_change(change, places)
+            begin_change(change, first, places)
             for side in range(-1, 2, 2):
                 _move_node(strands, at, n, side * x, side * y, side * z, e0, e1, trial)
-                found &= freeze_again(sliding, p, trial, stage, k, slot, place, places)
-                note_frozen(sliding, p, at, stage, slot, place, places, side * factor, change)
+                found = freeze_again(sliding, p, trial, stage, k, slot, place, places)
+                part = side * factor if found else math.nan
+                note_frozen(sliding, p, at, stage, slot, place, places, part, change, first)
             copy_row(at.position, n, trial.position, n)
             _copy_edge(at, e0, trial)
             _copy_edge(at, e1, trial)
-            freeze_again(sliding, p, at, stage, k, slot, place, places)
-            if found:
-                write_change(sliding, p, at, stage, slot, place, places, change, lacking, column, w)
-            begin_change(change, places)
-            u, v, t = origin[n, 0], origin[n, 1], origin[n, 2]
-            for side in range(-1, 2, 2):
-                origin[n, 0], origin[n, 1], origin[n, 2] = u + side * x, v + side * y, t + side * z
-                if places > 0:
-                    freeze_again(sliding, p, at, stage, k, slot, place, places)
-                note_frozen(sliding, p, at, stage, slot, place, places, side * factor, change)
-            origin[n, 0], origin[n, 1], origin[n, 2] = u, v, t
-            if places > 0:
-                freeze_again(sliding, p, at, stage, k, slot, place, places)
-            write_change(sliding, p, at, stage, slot, place, places, change, by_origin, column, w)
-    if not p.space.exists:
-        return
-    for pick in range(1 if e0 == e1 else 2):
-        e, found = e0 if pick == 0 else e1, True
-        begin_change(change, places)
+            first += step
+    for pick in range(0 if last == 0 else 1 if e0 == e1 else 2):
+        e = e0 if pick == 0 else e1
+        begin_change(change, first, places)
         for side in range(-1, 2, 2):
             _lead_edge(at, e, 0.0, 0.0, 0.0, side * h, trial)
-            found &= freeze_again(sliding, p, trial, stage, k, slot, place, places)
-            note_frozen(sliding, p, at, stage, slot, place, places, side * factor, change)
+            found = freeze_again(sliding, p, trial, stage, k, slot, place, places)
+            part = side * factor if found else math.nan
+            note_frozen(sliding, p, at, stage, slot, place, places, part, change, first)
         _copy_edge(at, e, trial)
+        first += step
+    freeze_again(sliding, p, at, stage, k, slot, place, places)
+    first = 0
+    for pick in range(4):
+        n = _end_of(strands, e0, e1, pick)
+        for w in range(ways.shape[0] if n >= 0 else 0):
+            column = strands.node_unknown[n]
+            if change.load[first] == change.load[first]:  # in reach of the barrier on both sides
+                write_change(sliding, p, at, stage, slot, place, places, change, first, lacking, column, w)
+            _note_origin(sliding, p, at, stage, h, k, slot, place, places, change, n, w)
+            write_change(sliding, p, at, stage, slot, place, places, change, 0, by_origin, column, w)
+            first += step
+    for pick in range(0 if last == 0 else 1 if e0 == e1 else 2):
+        e = e0 if pick == 0 else e1
+        column = strands.edge_unknown[e]
+        if change.load[first] == change.load[first]:
+            write_change(sliding, p, at, stage, slot, place, places, change, first, lacking, column, -1)
+        for q in range(step):
+            own = slot if q == 0 else place + q - 1
+            _slip_by_origin(sliding, surfaces, strands, own, -1, 0.0, 0.0, 0.0, e, change, q)
+        write_change(sliding, p, at, stage, slot, place, places, change, 0, by_origin, column, -1)
+        first += step
+
+
+@kernel
+def _note_origin(sliding, p, at, stage, h, k, slot, place, places, change, n, w):
+    """Note how a contact changes with the place of a node at the origin along a way."""
+    ways, origin = p.strands.axes, stage.origin_position
+    if places == 0:
+        x, y, z = ways[w, 0], ways[w, 1], ways[w, 2]
+        _slip_by_origin(sliding, p.surfaces, p.strands, slot, n, x, y, z, -1, change, 0)
+        return
+    x, y, z, u, v, t = h * ways[w, 0], h * ways[w, 1], h * ways[w, 2], origin[n, 0], origin[n, 1], origin[n, 2]
+    begin_change(change, 0, places)
+    for side in range(-1, 2, 2):
+        origin[n, 0], origin[n, 1], origin[n, 2] = u + side * x, v + side * y, t + side * z
         freeze_again(sliding, p, at, stage, k, slot, place, places)
-        if found:
-            write_change(sliding, p, at, stage, slot, place, places, change, lacking, strands.edge_unknown[e], -1)
-        begin_change(change, places)
-        u = origin_angle[e]
-        for side in range(-1, 2, 2):
-            origin_angle[e] = u + side * h
-            note_frozen(sliding, p, at, stage, slot, place, places, side * factor, change)
-        origin_angle[e] = u
-        write_change(sliding, p, at, stage, slot, place, places, change, by_origin, strands.edge_unknown[e], -1)
+        note_frozen(sliding, p, at, stage, slot, place, places, side / (2.0 * h), change, 0)
+    origin[n, 0], origin[n, 1], origin[n, 2] = u, v, t
+    freeze_again(sliding, p, at, stage, k, slot, place, places)
 
 
 @kernel
@@ -280,31 +327,31 @@ def _by_body(sliding, p, at, trial, stage, h, k, slot, place, places, change, f,
     unknown = p.sums.gradient.shape[0] + 6 * f
     for way in range(6):
         found = True
-        begin_change(change, places)
+        begin_change(change, 0, places)
         for side in range(-1, 2, 2):
             _move_body(surfaces, at, b, s, i, way, side * h, trial)
             _take_pose(sliding, trial, stage, b)
             found &= freeze_again(sliding, p, trial, stage, k, slot, place, places)
             product_transposed(at.rotation, b, sliding.back, b, sliding.rotation, b)
-            note_frozen(sliding, p, at, stage, slot, place, places, side * factor, change)
+            note_frozen(sliding, p, at, stage, slot, place, places, side * factor, change, 0)
         _copy_body(surfaces, at, b, s, i, trial)
         _take_pose(sliding, at, stage, b)
         freeze_again(sliding, p, at, stage, k, slot, place, places)
         if found:
-            write_change(sliding, p, at, stage, slot, place, places, change, lacking, unknown + way, -1)
+            write_change(sliding, p, at, stage, slot, place, places, change, 0, lacking, unknown + way, -1)
     kept = stack_matrix(4, 3)
     copy_row(stage.origin_pose_position, b, kept, 3)
     for c in range(3):
         copy_row(stage.origin_rotation[b], c, kept, c)
     for way in range(9):
-        begin_change(change, places)
+        begin_change(change, 0, places)
         size = stage.length if way >= 6 else 1.0
         for side in range(-1, 2, 2):
             _move_pose(p, stage, f, way, side * h)
             _take_pose(sliding, at, stage, b)
             if places > 0:
                 freeze_again(sliding, p, at, stage, k, slot, place, places)
-            note_frozen(sliding, p, at, stage, slot, place, places, side * factor * size, change)
+            note_frozen(sliding, p, at, stage, slot, place, places, side * factor * size, change, 0)
             copy_row(kept, 3, stage.origin_pose_position, b)
             for c in range(3):
                 copy_row(kept, c, stage.origin_rotation[b], c)
@@ -312,9 +359,9 @@ def _by_body(sliding, p, at, trial, stage, h, k, slot, place, places, change, f,
         if places > 0:
             freeze_again(sliding, p, at, stage, k, slot, place, places)
         if way < 3:
-            write_change(sliding, p, at, stage, slot, place, places, change, by_origin, unknown + way, -1)
+            write_change(sliding, p, at, stage, slot, place, places, change, 0, by_origin, unknown + way, -1)
         else:
-            write_change(sliding, p, at, stage, slot, place, places, change, slides, 6 * f + way - 3, -1)
+            write_change(sliding, p, at, stage, slot, place, places, change, 0, slides, 6 * f + way - 3, -1)
 
 
 @piece(

@@ -28,7 +28,7 @@ from bilayer_core.jit.record import Matrix, Stack, Vector
 class FrozenChange:
     """How what a contact and its places freeze changes with something."""
 
-    load: Vector  # shape (n_place + 1,)
+    load: Vector  # shape (n_change,): those of one thing follow each other
     smooth: Vector
     normal: Matrix
     axis: Matrix
@@ -39,9 +39,9 @@ class FrozenChange:
 
 
 @kernel
-def begin_change(change, places):
-    """Nothing has changed."""
-    for q in range(places + 1):
+def begin_change(change, first, places):
+    """Note that nothing has changed."""
+    for q in range(first, first + places + 1):
         change.load[q], change.smooth[q] = 0.0, 0.0
         for c in range(3):
             change.normal[q, c] = change.axis[q, c] = change.slip[q, c] = 0.0
@@ -51,12 +51,14 @@ def begin_change(change, places):
 
 
 @kernel
-def add_frozen(sliding, p, at, stage, slot, place, places, factor, change):
-    """Add a multiple of what a contact and its places took where they were frozen last, with their slip at `at`."""
+def add_frozen(sliding, p, at, stage, slot, place, places, factor, change, first):
+    """Add a multiple of what a contact and its places took where they were frozen last, with their slip at `at`, to
+    changes from the first one on.
+    """
     arm, lever, slip = stack_vector(3), stack_vector(3), stack_vector(3)
     arm[0] = arm[1] = arm[2] = 0.0
-    for q in range(places + 1):
-        k = slot if q == 0 else place + q - 1
+    for q in range(first, first + places + 1):
+        k = slot if q == first else place + q - first - 1
         contact_slip(sliding, p.surfaces, p.strands, at, stage, k, arm, lever, slip)
         change.load[q] += factor * sliding.load[k]
         change.smooth[q] += factor * sliding.smooth[k]

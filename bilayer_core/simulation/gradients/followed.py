@@ -36,6 +36,8 @@ FINE = 1e-5
 """Of the slip within which friction rests, of the smallest gap, and of a tenth of an edge: steps of differences."""
 SLIP = 1e-3
 """Likewise, where differences see no kink of friction."""
+SEEN = 14
+"""Unknowns that a contact of a rod sees, at most: those of four nodes and two turns."""
 ORIGIN = ("origin_position", "origin_angle", "origin_strain")
 """Parts of a stage that are moved."""
 
@@ -46,7 +48,7 @@ def _rounded(h: float) -> float:
 
 
 def _room_for(places: int) -> FrozenChange:
-    """Return a change of a contact with some places."""
+    """Return changes of a contact, or of its places."""
     shapes = {"rate": (3, 8)} | {name: (3,) for name in ("normal", "axis", "slip", "arm", "lever")}
     return FrozenChange(
         **{name: np.zeros((places, *shapes.get(name, ()))) for name in ("load", "smooth", *shapes)},
@@ -132,8 +134,8 @@ class Followed:
         if problem.moments.exists:
             self._add_moments(again, at)
         if sliding:
-            if len(self._change.load) < len(problem.sliding.load):
-                self._change = _room_for(len(problem.sliding.load))
+            if len(self._change.load) < SEEN * (len(problem.sliding.load) + 1):
+                self._change = _room_for(SEEN * (len(problem.sliding.load) + 1))
             h = min(0.1 * FINE * self._shortest, SLIP * problem.sliding.threshold * stage.length, FINE * again.gap)
             matrices = self._change, maps.lacking, maps.by_origin, maps.slides
             differentiate_friction(problem, at, again.spare, stage, _rounded(h), *matrices)

@@ -149,7 +149,7 @@ class StepRates:
             self._of.write_beyond(again, self._count, step)
         elif len(again.speeds):
             again.finish(self._count - 1)
-        _, *self._remembered = speeds_at_end(again)
+        self._remembered = speeds_at_end(again)[1:] if len(again.speeds) else (np.zeros(0), np.zeros(0))
         return reached
 
     def _begin(self, again: StepAgain, n: int) -> None:
