@@ -371,14 +371,16 @@ def _by_body(sliding, p, at, trial, stage, h, k, slot, place, places, change, f,
     Configuration,
     Stage,
     float,
+    float,
     FrozenChange,
     LackingMatrix,
     LackingMatrix,
     LackingMatrix,
 )
-def differentiate_friction(p, at, trial, stage, h, change, lacking, by_origin, slides):
+def differentiate_friction(p, at, trial, stage, far, near, change, lacking, by_origin, slides):
     """Add how friction on surfaces depends on what its contacts freeze at a configuration, on the origin of the stage,
-    and there on the turns R̃ and the spins ω̃ of free bodies, six columns each, to matrices; unknowns move by h.
+    and there on the turns R̃ and the spins ω̃ of free bodies, six columns each, to matrices; unknowns move `far`, or `near` where contacts are
+    spread.
     """
     sliding, surfaces = p.sliding, p.surfaces
     freeze_surface_contacts(sliding, p, at, stage)
@@ -396,6 +398,7 @@ def differentiate_friction(p, at, trial, stage, h, change, lacking, by_origin, s
         a, b, node = surfaces.contact_point_body[i], surfaces.body[s], surfaces.near_node[k]
         spread = a < 0 and sliding.spread[s, node] and sliding.load[slot] == 0.0
         places = place_count(sliding, surfaces, p.strands, slot) if spread else 0
+        h = near if spread else far
         _copy_body(surfaces, at, b, s, -1, trial)
         if a >= 0:
             _copy_body(surfaces, at, a, -1, i, trial)

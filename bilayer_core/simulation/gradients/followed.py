@@ -35,7 +35,7 @@ REACH = 2
 FINE = 1e-5
 """Of the slip within which friction rests, of the smallest gap, and of a tenth of an edge: steps of differences."""
 SLIP = 1e-3
-"""Likewise, where differences see no kink of friction."""
+"""Likewise, where contacts are spread, which has kinks."""
 SEEN = 14
 """Unknowns that a contact of a rod sees, at most: those of four nodes and two turns."""
 ORIGIN = ("origin_position", "origin_angle", "origin_strain")
@@ -136,9 +136,10 @@ class Followed:
         if sliding:
             if len(self._change.load) < SEEN * (len(problem.sliding.load) + 1):
                 self._change = _room_for(SEEN * (len(problem.sliding.load) + 1))
-            h = min(0.1 * FINE * self._shortest, SLIP * problem.sliding.threshold * stage.length, FINE * again.gap)
+            far = min(0.1 * FINE * self._shortest, FINE * again.gap)
+            steps = _rounded(far), _rounded(min(far, SLIP * problem.sliding.threshold * stage.length))
             matrices = self._change, maps.lacking, maps.by_origin, maps.slides
-            differentiate_friction(problem, at, again.spare, stage, _rounded(h), *matrices)
+            differentiate_friction(problem, at, again.spare, stage, *steps, *matrices)
         if rubbing or self._otherwise:
             found = self._by_differences(again, at, rubbing)
             for matrix, entries in zip((maps.lacking, maps.by_origin, maps.by_strain), found, strict=True):
