@@ -51,7 +51,7 @@ class BodyMaps:
 
 @kernel
 def _cross_matrix(x, y, z, out):
-    """Write [v]×."""
+    """Write the matrix [v]×."""
     out[0, 0] = out[1, 1] = out[2, 2] = 0.0
     out[0, 1], out[0, 2], out[1, 2] = -z, y, -x
     out[1, 0], out[2, 0], out[2, 1] = z, -y, x

@@ -248,7 +248,7 @@ def _end_of(strands, e0, e1, pick):
 
 @kernel
 def _by_rod(sliding, p, at, trial, stage, h, k, slot, place, places, change, lacking, by_origin):
-    """Differentiate a contact of a rod by nodes and turns of the edges at its node."""
+    """Add how a contact of a rod depends on nodes and turns of the edges at its node."""
     surfaces, strands, factor, ways = p.surfaces, p.strands, 1.0 / (2.0 * h), p.strands.axes
     node = sliding.node[slot]
     e0, e1 = surfaces.node_edges[node, 0], surfaces.node_edges[node, 1]
@@ -320,7 +320,7 @@ def _note_origin(sliding, p, at, stage, h, k, slot, place, places, change, n, w)
 
 @kernel
 def _by_body(sliding, p, at, trial, stage, h, k, slot, place, places, change, f, side_of, lacking, by_origin, slides):
-    """Differentiate a contact by the motion of a free body, that of its point or that of its surface."""
+    """Add how a contact depends on the motion of a free body, that of its point or that of its surface."""
     surfaces, factor, b = p.surfaces, 1.0 / (2.0 * h), p.bodies.body_of_free[f]
     s = sliding.surface[slot] if side_of == 1 else -1
     i = sliding.first[slot] if side_of == 0 else -1
@@ -379,8 +379,8 @@ def _by_body(sliding, p, at, trial, stage, h, k, slot, place, places, change, f,
 )
 def differentiate_friction(p, at, trial, stage, far, near, change, lacking, by_origin, slides):
     """Add how friction on surfaces depends on what its contacts freeze at a configuration, on the origin of the stage,
-    and there on the turns R̃ and the spins ω̃ of free bodies, six columns each, to matrices; unknowns move `far`, or `near` where contacts are
-    spread.
+    and there on the turns R̃ and the spins ω̃ of free bodies, six columns each, to matrices; unknowns move `far`, or
+    `near` where contacts are spread.
     """
     sliding, surfaces = p.sliding, p.surfaces
     freeze_surface_contacts(sliding, p, at, stage)

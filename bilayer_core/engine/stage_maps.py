@@ -216,7 +216,7 @@ def _add_block(strands, e, block, matrix):
 
 @kernel
 def _skew(v, c, d):
-    """Return [v]× at (c, d)."""
+    """Return an entry of the matrix [v]×."""
     if c == d:
         return 0.0
     return -v[3 - c - d] if (c + 1) % 3 == d else v[3 - c - d]

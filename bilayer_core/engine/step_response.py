@@ -43,7 +43,7 @@ from bilayer_core.model.records.step import Configuration, Method, Stage
 
 @record
 class StepConstants:
-    """What rates of all steps of a model share, for all vectors of shape (n_whole,)."""
+    """Constants that rates of all steps of a model share."""
 
     free: Vector  # 1 where anything depends on unknowns, shape (size,)
     moves: Vector  # 1 where velocities depend on anything

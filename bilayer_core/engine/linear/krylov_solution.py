@@ -18,8 +18,8 @@ ROUNDED = 1e-13
 
 @record
 class Lack:
-    """What a Hessian lacks, by motions of all nodes and forces on them, those among them that bodies hold, and the
-    space of Krylov in which both are solved.
+    """Part of a matrix that a Hessian lacks, by motions of all nodes and forces on them, those among them that bodies
+    hold, and the space of Krylov in which both are solved.
     """
 
     matrix: LackingMatrix

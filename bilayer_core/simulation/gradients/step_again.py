@@ -207,7 +207,7 @@ class StepAgain(Evaluator):
 
     @property
     def overfull(self) -> bool:
-        """Whether there was too little room for entries of maps; now there is more, and maps are zero."""
+        """True if there was too little room for entries of maps; now there is more, and maps are zero."""
         maps = self.maps
         lists = maps.lacking, maps.by_origin, maps.slides, maps.by_strain, maps.by_kept
         most = max(int(of.count[0]) for of in lists)
