@@ -24,12 +24,10 @@ from bilayer_core.model.force_slots import NAMES
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.simulation.gradients.entries import Entries
-from bilayer_core.simulation.gradients.step_again import StepAgain
+from bilayer_core.simulation.gradients.step_again import PRESSING, StepAgain
 
 Array = np.ndarray
 BY_DIFFERENCES = ("added mass", "followers", "moments", "rod friction")
-PRESSING = ("barrier", "rod barrier", "restitution")
-"""On which friction depends."""
 REACH = 2
 """Nodes along a strand over which such a force at one depends on another."""
 FINE = 1e-5

@@ -46,6 +46,8 @@ ELASTIC = ("stretching", "bending", "twisting", "flattening", "bond", "viscosity
 """Forces that see eigenstrains."""
 FOLLOWING = ("drag", "turning drag", "added mass", "followers", "moments", "friction", "rod friction")
 """Forces that take something from the configuration."""
+PRESSING = ("barrier", "rod barrier", "restitution")
+"""Forces on which friction depends."""
 MOST = 12
 """Corrections of a stage."""
 ENOUGH = 1e-13
@@ -150,7 +152,9 @@ class StepAgain(Evaluator):
         self._tolerance = tolerance
         self._settles = not {"friction", "rod friction"}.isdisjoint(model.forces)
         self.ended, self.last = self._work.end, self.places[0]
-        self._elastic = [name for name in ELASTIC if name in model.forces]
+        self._elastic, self._pressing = (
+            np.array([name in chosen and name in model.forces for name in NAMES]) for chosen in (ELASTIC, PRESSING)
+        )
         layout = self.problem.strands
         self.of_nodes = layout.node_unknown[:, None] + np.arange(3)
         self.of_edges = layout.edge_unknown
@@ -322,7 +326,7 @@ class StepAgain(Evaluator):
     def follow(self, at: Configuration) -> None:
         """Let forces take from a configuration what they hold fixed."""
         if self._settles:
-            self.select(at, None)
+            self.sums.selected[:] = self._pressing
             follow(self.problem, at, self.stage)
         else:
             self.update_lagged(at)
@@ -410,12 +414,12 @@ class StepAgain(Evaluator):
 
     def differentiate_by_laws(self, at: Configuration, differences: StrainDifferences, change: float) -> None:
         """Write how the gradient at a configuration depends on the eigenstrain of each law; see `StrainDifferences`."""
-        self.select(at, self._elastic)
+        self.sums.selected[:] = self._elastic
         differentiate_by_laws(self.problem, self._work, differences, at, change)
 
     def differentiate_by_strains(self, at: Configuration, differences: StrainDifferences, change: float) -> None:
         """Write how the gradient at a configuration depends on strains at the origin; see `StrainDifferences`."""
-        self.select(at, self._elastic)
+        self.sums.selected[:] = self._elastic
         differentiate_by_strains(self.problem, differences, at, self.stage, change)
 
 
