@@ -272,6 +272,17 @@ def _collapsed(strands, at):
     return -1
 
 
+@piece(int, Problem, StateArrays, Method, StageInputs, Work, int, Configuration, Configuration)
+def move_beyond(p, state, method, inputs, work, n, start, end):
+    """Move from the end of the last stage, the configuration `start`, to the end of a step, its point n; returns a
+    status.
+    """
+    set_origin(work, method, n)
+    drive_stage(p, state, inputs, n, work)
+    predict_end(p, state, work, inputs, n, work.end, start)
+    return first_guess_of(p, start, inputs.position[n], inputs.rotation[n], work.stage, end, True)
+
+
 @kernel
 def _end_beyond(p, state, start_state, method, inputs, work, s, e):
     """Move from the last stage, configuration number `s`, to the end of a step, and evaluate the potential there, in
@@ -279,10 +290,7 @@ def _end_beyond(p, state, start_state, method, inputs, work, s, e):
     """
     n, stage = method.couplings.shape[1], work.stage
     start, end = configuration_at(work.configurations[s]), configuration_at(work.configurations[e])
-    set_origin(work, method, n)
-    drive_stage(p, state, inputs, n, work)
-    predict_end(p, state, work, inputs, n, work.end, start)
-    status = first_guess_of(p, start, inputs.position[n], inputs.rotation[n], stage, end, True)
+    status = move_beyond(p, state, method, inputs, work, n, start, end)
     if status != READY:
         return BEYOND if status == BLOCKED else status, e
     write_end(p, state, work.origin, end, inputs, n)

@@ -326,45 +326,55 @@ def _lies_flat(surfaces, strands, stage, i, n, gap, length):
     return True
 
 
+@kernel
+def freeze_contact(sliding, p, at, stage, k, count, n, arm):
+    """Freeze the contact of near pair k as contact `count`, with scratch for its normal and its arm; return whether
+    there is one, and whether it is the same as before.
+    """
+    surfaces = p.surfaces
+    i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
+    x, weight, radius = place_of(surfaces, at, k), surfaces.near_weight[k], surfaces.near_radius[k]
+    d, n[0], n[1], n[2], _, _, _ = gap_normal(surfaces, at, radius, s, x[0], x[1], x[2])
+    if not 0.0 < d < surfaces.d_hat or weight == 0.0:
+        return False, True
+    a, b, node, mix = surfaces.contact_point_body[i], surfaces.body[s], surfaces.near_node[k], mix_of(surfaces, k)
+    same = count < sliding.count[0] and sliding.first[count] == i and sliding.surface[count] == s
+    part = mix[0] + mix[1]
+    same &= sliding.part[count, 0] == part and sliding.part[count, 1] == mix[5]
+    sliding.first[count], sliding.surface[count], sliding.node[count] = i, s, node
+    sliding.part[count, 0], sliding.part[count, 1] = part, mix[5]
+    sliding.length[count] = 0.0
+    sliding.smooth[count], sliding.last_load[count] = sliding.threshold, sliding.load[count]
+    sliding.load[count] = -surfaces.stiffness * weight * barrier_gradient(d, surfaces.d_hat)
+    if p.restitution.exists:
+        sliding.load[count] *= 1.0 - damping_at(p, stage, i, s, d)[0]
+    from_point = row(at.pose_position, a) if a >= 0 else _on_curve(surfaces, at, node, mix)
+    for c in range(3):
+        touched = x[c] - radius * n[c]
+        arm[c] = touched - from_point[c]
+        sliding.normal[count, c], sliding.arm[count, c] = n[c], arm[c]
+        sliding.lever[count, c] = touched - at.pose_position[b, c]
+    if a < 0:
+        if _lies_flat(surfaces, p.strands, stage, node, n, d, surfaces.near_length[k]):
+            sliding.length[count] = surfaces.near_length[k]
+        write_rate(surfaces, at, node, mix, arm, count, sliding.arm_rate)
+    _write_axis(sliding, surfaces, at, count, i, s, node, n)
+    return True, same
+
+
 @piece(bool, Sliding, Problem, Configuration, Stage)
 def freeze_surface_contacts(sliding, p, at, stage):
     """List the contacts at a configuration, with their normal forces, directions and arms; near pairs are those that
     the barrier listed. Returns whether they are the same as before.
     """
-    surfaces = p.surfaces
     for b in range(at.rotation.shape[0]):
         copy_matrix(at.rotation, b, sliding.back, b)
         product_transposed(stage.origin_rotation, b, sliding.back, b, sliding.origin_rotation, b)
     n, arm, count, same = stack_vector(3), stack_vector(3), 0, True
-    for k in range(surfaces.near_count[0]):
-        i, s = surfaces.near_contact_point[k], surfaces.near_surface[k]
-        x, weight, radius = place_of(surfaces, at, k), surfaces.near_weight[k], surfaces.near_radius[k]
-        d, n[0], n[1], n[2], _, _, _ = gap_normal(surfaces, at, radius, s, x[0], x[1], x[2])
-        if not 0.0 < d < surfaces.d_hat or weight == 0.0:
-            continue
-        a, b, node, mix = surfaces.contact_point_body[i], surfaces.body[s], surfaces.near_node[k], mix_of(surfaces, k)
-        same &= count < sliding.count[0] and sliding.first[count] == i and sliding.surface[count] == s
-        part = mix[0] + mix[1]
-        same &= sliding.part[count, 0] == part and sliding.part[count, 1] == mix[5]
-        sliding.first[count], sliding.surface[count], sliding.node[count] = i, s, node
-        sliding.part[count, 0], sliding.part[count, 1] = part, mix[5]
-        sliding.length[count] = 0.0
-        sliding.smooth[count], sliding.last_load[count] = sliding.threshold, sliding.load[count]
-        sliding.load[count] = -surfaces.stiffness * weight * barrier_gradient(d, surfaces.d_hat)
-        if p.restitution.exists:
-            sliding.load[count] *= 1.0 - damping_at(p, stage, i, s, d)[0]
-        from_point = row(at.pose_position, a) if a >= 0 else _on_curve(surfaces, at, node, mix)
-        for c in range(3):
-            touched = x[c] - radius * n[c]
-            arm[c] = touched - from_point[c]
-            sliding.normal[count, c], sliding.arm[count, c] = n[c], arm[c]
-            sliding.lever[count, c] = touched - at.pose_position[b, c]
-        if a < 0:
-            if _lies_flat(surfaces, p.strands, stage, node, n, d, surfaces.near_length[k]):
-                sliding.length[count] = surfaces.near_length[k]
-            write_rate(surfaces, at, node, mix, arm, count, sliding.arm_rate)
-        _write_axis(sliding, surfaces, at, count, i, s, node, n)
-        count += 1
+    for k in range(p.surfaces.near_count[0]):
+        found, alike = freeze_contact(sliding, p, at, stage, k, count, n, arm)
+        same &= alike
+        count += found
     whole = count
     if sliding.spreads:
         count = _spread(sliding, p, at, stage, count)
@@ -432,13 +442,8 @@ def _spread(sliding, p, at, stage, count):
     for k in range(whole):
         if sliding.length[k] == 0.0:
             continue
-        i, s, c, load = sliding.node[k], sliding.surface[k], sliding.part[k, 0], sliding.load[k]
-        before, after = surfaces.node_edges[i, 0], surfaces.node_edges[i, 1]
-        both = surfaces.edge_length[before] + surfaces.edge_length[after]
-        half, ends = sliding.length[k] / both, before == after and c == 0.0
-        if ends:
-            half *= 2.0
-        places = int(math.ceil(PARTS * half - ROUNDING))
+        i, s, c = sliding.node[k], sliding.surface[k], sliding.part[k, 0]
+        half, places = _stretch(sliding, surfaces, k)
         if count - whole + 2 * places > most:
             continue
         contact_slip(sliding, surfaces, strands, at, stage, k, arm, lever, slip)
@@ -450,20 +455,54 @@ def _spread(sliding, p, at, stage, count):
             size = _change(sliding, surfaces, strands, at, stage, k, e, change)
             if size > ALIKE * stuck:
                 sliding.spread[s, i] |= _turns(slip, change, size, side * (half + BESIDE), stuck)
-        if not sliding.spread[s, i]:
+        if sliding.spread[s, i]:
+            count = spread_contact(sliding, p, at, stage, k, count, arm, change)
+    return count
+
+
+@kernel
+def _stretch(sliding, surfaces, k):
+    """Return half the stretch of a contact as a part of an edge, all of it at an end, and how many places it has."""
+    i, c = sliding.node[k], sliding.part[k, 0]
+    before, after = surfaces.node_edges[i, 0], surfaces.node_edges[i, 1]
+    half = sliding.length[k] / (surfaces.edge_length[before] + surfaces.edge_length[after])
+    if before == after and c == 0.0:
+        half *= 2.0
+    return half, int(math.ceil(PARTS * half - ROUNDING))
+
+
+@kernel
+def place_count(sliding, surfaces, strands, k):
+    """Return how many places contact k has where it is spread."""
+    count, places = 0, _stretch(sliding, surfaces, k)[1]
+    for side in range(-1, 2, 2):
+        if _edge_beside(surfaces, strands, sliding.node[k], sliding.part[k, 0], side) >= 0:
+            count += places
+    return count
+
+
+@kernel
+def spread_contact(sliding, p, at, stage, k, count, arm, change):
+    """Spread contact k over its stretch, from contact `count` on; return the number of contacts. The last two are
+    scratch.
+    """
+    surfaces, strands, step = p.surfaces, p.strands, stage.length
+    i, c, load = sliding.node[k], sliding.part[k, 0], sliding.load[k]
+    before, after = surfaces.node_edges[i, 0], surfaces.node_edges[i, 1]
+    both, ends = surfaces.edge_length[before] + surfaces.edge_length[after], before == after and c == 0.0
+    half, places = _stretch(sliding, surfaces, k)
+    for side in range(-1, 2, 2):
+        e = _edge_beside(surfaces, strands, i, c, side)
+        if e < 0:
             continue
-        for side in range(-1, 2, 2):
-            e = _edge_beside(surfaces, strands, i, c, side)
-            if e < 0:
-                continue
-            share = 1.0 if ends else surfaces.edge_length[e] / both if c == 0.0 else 0.5
-            size = _change(sliding, surfaces, strands, at, stage, k, e, change)
-            for place in range(places):
-                _add_place(sliding, surfaces, at, k, c + side * half * (place + 0.5) / places, arm, count)
-                sliding.load[count] = load * share / places
-                sliding.smooth[count] = max(sliding.threshold, size * half / (places * step))
-                count += 1
-        sliding.load[k] = 0.0
+        share = 1.0 if ends else surfaces.edge_length[e] / both if c == 0.0 else 0.5
+        size = _change(sliding, surfaces, strands, at, stage, k, e, change)
+        for place in range(places):
+            _add_place(sliding, surfaces, at, k, c + side * half * (place + 0.5) / places, arm, count)
+            sliding.load[count] = load * share / places
+            sliding.smooth[count] = max(sliding.threshold, size * half / (places * step))
+            count += 1
+    sliding.load[k] = 0.0
     return count
 
 

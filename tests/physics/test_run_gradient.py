@@ -42,7 +42,7 @@ STILL_WATER, BODY = {"fluid.added_mass": False}, "rods.body.layers.active"
 JET = {"name": "jet", "rod": "strip", "position": 0.1, "force": [0, 0.01, 0.02], "frame": "material"}
 MOVES = {"bodies.wall.motion": {"type": "prescribed", "times": [0, 0.1], "displacements": [[0, 0, 0], [0, 0, 0.01]]}}
 EULER = {"solver.integrator": "implicit_euler", "solver.dt": 0.004, "solver.tolerance": None}
-ALPHA = {"solver.integrator": "generalised_alpha"}
+ALPHA, MIDPOINT = {"solver.integrator": "generalised_alpha"}, {"solver.integrator": "implicit_midpoint"}
 UNLIKE = {"solver.integrator": "tr_bdf2", THICKNESS: 1.5e-4}
 VISCOUS, SPACE = {VISCOSITY: 0.05}, {"solver.dimension": 3}
 HEAVY = {"fluid.added_mass": True}
@@ -69,6 +69,14 @@ TURNED = "joints.pivot.turning"
 SPINNING = dict(FREE, inertia=[3e-8, 5e-8, 7e-8], angular_velocity=[3.0, 5.0, -4.0])
 AT_TIP = bob({"type": "pin"}) | {"joints": []}
 """A body at the end of the strip."""
+FLOOR = {"name": "floor", "type": "plane", "point": [0, 0, -0.0056], "normal": [0, 0, 1]}
+DAMPED = {"barrier_distance": 2e-4, "stiffness": "10 MPa", "restitution": 0.5}
+LANDS = AT_TIP | {
+    "bodies": [WALL, AT_TIP["bodies"][1] | {"surface": {"shape": "sphere", "radius": 0.005}}],
+    "gravity": [0, 0, -50.0],
+    "obstacles": [FLOOR],
+    "contact": DAMPED,
+}
 TWIST = {"name": "twist", "body": "tip", "moment": [0.0005, 0.002, 0.001], "frame": "material"}
 LIT = {"stimuli.sun.light": None, "stimuli.sun.schedule.start": 0, "stimuli.sun.schedule.end": 0.05}
 SWELLS = LIT | {"rods.ring.layers.outer.eigenstrain": {"stimulus": "sun", "gain": 0.01}}
@@ -76,6 +84,10 @@ RING = SWELLS | SPACE | {"gravity": [1.0, 0.5, -9.81]}
 DRIES = {"materials.tissue.retardation_time": 0.01, "rods.valve.layers.outer.interval": [0, 0.06]}
 OF_TIP = {"drag": {"coefficient": 0.5, "area": 1e-3}}
 DRAGGED = {"bodies": [WALL, AT_TIP["bodies"][1] | OF_TIP], "fluid": WATER | {"added_mass": True}}
+SPUN = HANGING | SPACE | MIDPOINT | {"bodies.wall.motion": SPINNING, LAG: 0.05}
+OFF_CURVE = HANGING | {THICKNESS: 1.5e-4, DENSITY: 2000.0}
+PUSHED_OFF = OFF_CURVE | SPACE | {"loads": [JET], "solver.integrator": "sdirk2"}
+WADES = PUSHED_OFF | {MODULUS: 3e7, "fluid": WATER | {"added_mass": True}}
 RESTS = {"start": "settle", "stimuli.swelling.schedule.from": 0.3}
 CASES = {
     "in a plane": ("bending", HANGING, 0.2, [GAIN, LEVEL, TIME, MODULUS, THICKNESS, "gravity.2", LENGTH]),
@@ -87,7 +99,10 @@ CASES = {
     "generalised alpha": ("bending", HANGING | ALPHA | VISCOUS | SPACE, 0.1, [GAIN, MODULUS, THICKNESS]),
     "layers that become unlike": ("bending", HANGING | UNLIKE, 0.1, [MODULUS, DENSITY]),
     "a lag": ("bending", HANGING | {LAG: 0.05}, 0.2, [GAIN, LEVEL, LAG]),
-    "masses off the curve": ("bending", HANGING | {THICKNESS: 1.5e-4, DENSITY: 2000.0}, 0.1, [THICKNESS, LENGTH]),
+    "masses off the curve": ("bending", OFF_CURVE, 0.1, [THICKNESS, LENGTH]),
+    "masses off the curve that turn": ("bending", PUSHED_OFF, 0.05, [GAIN, THICKNESS, "loads.0.force.2"]),
+    "added mass of unlike layers": ("bending", WADES, 0.05, [GAIN, THICKNESS, "loads.0.force.2"]),
+    "added mass of layers that become unlike": ("bending", HANGING | ALPHA | IN_WATER | HEAVY, 0.05, [THICKNESS]),
     "a clamp that moves": ("bending", HANGING | MOVES, 0.1, [GAIN, "bodies.wall.motion.displacements.1.2"]),
     "a strip that curls": ("bending", HANGING | {"rods.strip.section": "strip", LEVEL: 0.3}, 0.2, [GAIN, MODULUS]),
     "fibres in space": ("chiral_pod", {}, 0.02, ["gravity.2"]),
@@ -110,7 +125,9 @@ CASES = {
         0.03,
         [GAIN, LENGTH, "bodies.wall.motion.inertia.1"],
     ),
+    "the implicit midpoint rule": ("bending", SPUN, 0.03, [GAIN, LAG, LENGTH, "bodies.wall.motion.inertia.1"]),
     "a moment": ("bending", AT_TIP | {"loads": [TWIST]}, 0.03, [GAIN, "loads.0.moment.1"]),
+    "a body that rebounds": ("bending", LANDS, 0.012, ["contact.restitution", "gravity.2"]),
     "a body in water": ("bending", AT_TIP | DRAGGED, 0.02, [GAIN, "fluid.density"]),
     "a viscous strip on a body": ("bending", AT_TIP | VISCOUS, 0.03, [GAIN, LENGTH, VISCOSITY]),
     "a viscous strip of fibres": ("chiral_pod", DRIES, 0.02, ["gravity.2", "materials.tissue.retardation_time"]),
@@ -130,7 +147,9 @@ ALIKE = STRIDE | STEPS_OF_1_MS | {"contact.friction": {"coefficient": 0.6, "spee
 GRIP = CLOSE | STEPS_OF_1_MS | {"stimuli.humidity.schedule.start": 0}
 BALL, FOOT, COEFFICIENT = "body/ball/position", "rod/hind_foot/position", "contact.friction.coefficient"
 GAIN_OF_ARMS, GAIN_OF_TRUNK = (f"rods.{rod}.layers.active.eigenstrain.gain" for rod in ("arm", "trunk"))
+SLIPS = LANDS | {"contact": DAMPED | {"friction": {"coefficient": 0.3, "speed_threshold": 0.01}}}
 RUBBING = {
+    "a body that rebounds": ("bending", SLIPS, 0.012, ["contact.restitution", GAIN], "body/tip/position"),
     "a crawler": ("crawling_inchworm", {}, 0.05, [f"{BODY}.eigenstrain.gain", "contact.friction.forward"], "com"),
     "rods in space": ("knot", {}, 0.005, ["materials.rubber.density"], "com"),
     "a jumper": ("jumping", {}, 0.03, ["gravity.2"], "com"),
@@ -207,11 +226,14 @@ BACK = {
     "friction on bodies": ("crawling_dual_leg", ALIKE, 0.002, ["gravity.2", COEFFICIENT]),
     "a grip": ("gripping", GRIP, 0.052, [COEFFICIENT, GAIN_OF_ARMS]),
     "a hinge that rubs": ("bending", bob(HINGE), 0.05, [GAIN, f"{TURNED}.friction"]),
+    "a body that rebounds": ("bending", SLIPS, 0.012, [GAIN, "contact.restitution"]),
     "a body that turns": ("bending", HANGING | TURNING, 0.05, [GAIN, "gravity.2"]),
     "a body with a history": ("bending", HANGING | TURNING | {"solver.integrator": "tr_bdf2"}, 0.01, [GAIN]),
+    "the implicit midpoint rule": ("bending", SPUN, 0.02, [GAIN, LEVEL, LENGTH]),
     "a body in water": ("bending", AT_TIP | DRAGGED, 0.01, ["fluid.density"]),
     "a viscous strip of fibres": ("chiral_pod", DRIES, 0.01, ["gravity.2"]),
     "added mass": ("flagellum", {}, 0.05, ["fluid.density"]),
+    "added mass of unlike layers": ("bending", WADES | ALPHA, 0.05, [GAIN, "fluid.density"]),
     "drag of turns": ("bending", IN_WATER | {"loads": [JET]}, 0.1, ["fluid.density"]),
 }
 
@@ -331,8 +353,7 @@ def test_a_run_that_begins_elsewhere_begins_there_whatever_the_numbers_are():
     ("name", "overrides", "to", "told"),
     [
         ("ring", {}, "gravity.2", "light"),
-        ("six_finger_gripper", {}, "gravity.2", "restitution"),
-        ("bending", {"solver.integrator": "implicit_midpoint"}, GAIN, "end beyond their last stage"),
+        ("bending", IN_WATER | HEAVY | MIDPOINT, "fluid.density", "end beyond their last stage"),
         ("bending", {"bodies.wall.motion": SPINNING, "start": "settle"}, GAIN, "settles and then moves"),
         ("bending", {}, "swelling", "a number of its schedule"),
         ("bending", {}, "contact.stiffness", "contact"),

@@ -48,6 +48,7 @@ class Course:
         self._most, self._stride = max(room // state.values.nbytes, 2), 1
         self._spans: list[_Span] = []
         self._last = state.values.copy()
+        self._shared: list[tuple[Array, State]] = []  # by their values
 
     def __len__(self) -> int:
         return sum(len(span.ends) for span in self._spans)
@@ -107,6 +108,15 @@ class Course:
         state.values[:] = values
         return state
 
+    def _shared_of(self, values: Array) -> State:
+        """Return the state with some values, which is the end of one step and the start of the next."""
+        for kept, state in self._shared:
+            if kept is values:
+                return state
+        state = self._of(values)
+        self._shared = [*self._shared[-1:], (values, state)]
+        return state
+
     def steps(self, maker: Stepper, backward: bool = False) -> Iterator[KeptStep]:
         """Yield all steps, the last one first if `backward`; `maker` makes those again of which no state is kept."""
         ends = [span.start for span in self._spans[1:]] + [self._last]
@@ -127,13 +137,14 @@ class Course:
             yield [end for (end, _), _ in group], self._method(stood_in), state
 
     def _made(self, span: _Span, end: Array, maker: Stepper) -> Iterator[KeptStep]:
-        state = self._of(span.start)
+        state = self._shared_of(span.start)
         _set_outside(state, span.outside)
         for k, (time, stood_in) in enumerate(zip(span.ends, span.stood_in, strict=True)):
-            start, state = state, state.copy()
+            start = state
             if k + 1 == len(span.ends):
-                state.values[:] = end
+                state = self._shared_of(end)
             else:
+                state = state.copy()
                 maker.make_again(state, time, stood_in)
             yield KeptStep(start, state, self._method(stood_in), span.spread[k])
 

@@ -6,47 +6,48 @@ its stages follow from these; Newton's method then makes corrections that the ro
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from bilayer_core.engine.body_maps import BodyMaps, write_body_maps
+from bilayer_core.engine.configuration import move
 from bilayer_core.engine.evaluator import Evaluator
-from bilayer_core.engine.linear.newton_matrix import solve
+from bilayer_core.engine.gradient_differences import StrainDifferences, differentiate_by_laws, differentiate_by_strains
+from bilayer_core.engine.linear.krylov_solution import Lack
+from bilayer_core.engine.linear.lacking_matrix import LackingMatrix
+from bilayer_core.engine.stage_maps import StageMaps
+from bilayer_core.engine.step import move_beyond
 from bilayer_core.engine.step_ends import end_stage
 from bilayer_core.engine.steps_again import (
-    Lack,
     Reached,
-    StrainDifferences,
     begin_stage,
     begin_step,
-    differentiate_by_laws,
-    differentiate_by_strains,
+    correct,
     expect_end,
+    factorise_end,
     follow,
     go_to,
-    solve_with_lack,
+    pass_stage,
 )
 from bilayer_core.errors import SimulationError
+from bilayer_core.model.force_slots import NAMES
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Method, StateArrays
 from bilayer_core.model.state import State
-from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.surroundings import Surroundings
 
 Array = np.ndarray
-Lacking = tuple[Entries | None, Entries | None, Entries | None, Array | None]
-"""What a Hessian lacks, and the gradient by the origin of a stage, by directors there, and by the turns R̃ and spins ω̃
-of free bodies (`BodyRates.slides`); None for nothing. Forces are those on all nodes, those among them that bodies hold.
-"""
-ROUNDS, ROUNDED = 80, 1e-13
-"""Of solutions with what a Hessian lacks: the most there may be, and what may be left, of the whole."""
-SMALL = 1e-3
-"""Angles below which Jacobians are series [rad]."""
+ROUNDS = 80
+"""Of solutions with what a Hessian lacks, at most."""
 ELASTIC = ("stretching", "bending", "twisting", "flattening", "bond", "viscosity")
 """Forces that see eigenstrains."""
+FOLLOWING = ("drag", "turning drag", "added mass", "followers", "moments", "friction", "rod friction")
+"""Forces that take something from the configuration."""
+PRESSING = ("barrier", "rod barrier", "restitution")
+"""Forces on which friction depends."""
 MOST = 12
 """Corrections of a stage."""
 ENOUGH = 1e-13
@@ -81,6 +82,12 @@ class KeptStep:
         """Duration [s]."""
         return float(self.end.time[0]) - self.begin
 
+    @property
+    def beyond(self) -> bool:
+        """Whether it ends beyond its last stage."""
+        points, stages = self.method.couplings.shape
+        return points > stages
+
 
 class StepAgain(Evaluator):
     """Makes kept steps again.
@@ -95,7 +102,7 @@ class StepAgain(Evaluator):
     same : float
         Two times that differ by no more are one [s].
     stages : int
-        Of a step, at most.
+        Of a step, at most, its end counted where that is beyond the last one.
     history : bool
         Whether the integrator keeps stage derivatives.
     tolerance : float
@@ -104,13 +111,15 @@ class StepAgain(Evaluator):
     Attributes
     ----------
     places : list of Configuration
-        The start of the step, then the end of each stage.
+        The start of the step, then the end of each stage, and of a step that ends beyond its last one.
     guesses : list of Configuration
         Where Newton's method began in each stage.
     reached : Reached
         Where the stage ended that was found last.
+    ended, last : Point, Configuration
+        The end of the last stage, or of the step where that is beyond it.
     size, wet : int
-        Of unknowns, and of the fluid's momentum in their places.
+        Of unknowns, and of the fluid's momentum: in their places, then of kept directors.
     """
 
     def __init__(
@@ -142,15 +151,74 @@ class StepAgain(Evaluator):
         self._size = max(rod.path.length for rod in model.scene.rods)
         self._tolerance = tolerance
         self._settles = not {"friction", "rod friction"}.isdisjoint(model.forces)
-        self._lack: Lack | None = None
-        self._elastic = [name for name in ELASTIC if name in model.forces]
+        self.ended, self.last = self._work.end, self.places[0]
+        self._elastic, self._pressing = (
+            np.array([name in chosen and name in model.forces for name in NAMES]) for chosen in (ELASTIC, PRESSING)
+        )
         layout = self.problem.strands
         self.of_nodes = layout.node_unknown[:, None] + np.arange(3)
         self.of_edges = layout.edge_unknown
         self._rods = len(self.sums.gradient)
         self.size = self._rods + 6 * bodies
         self.of_bodies = self._rods + np.arange(6 * bodies).reshape(bodies, 6)
-        self.wet = self.size if self.problem.fluid.exists else 0
+        fluid = self.problem.fluid
+        self.wet = self.size + 3 * (len(fluid.momentum) - model.node_count) if fluid.exists else 0
+        self._room = 0
+        self.lacks = False
+        self.grow_maps(256)
+
+    def grow_maps(self, room: int) -> None:
+        """Make maps with room for so many entries beside bands; they are zero."""
+        problem = self.problem
+        reach, edges = _reach(self), len(self.of_edges)
+
+        def matrix(width: int) -> LackingMatrix:
+            return LackingMatrix(
+                band=np.zeros((self._rods if width else 0, width)),
+                count=np.zeros(1, dtype=np.int64),
+                row=np.zeros(room, dtype=np.int64),
+                column=np.zeros(room, dtype=np.int64),
+                value=np.zeros(room),
+            )
+
+        edge_of = np.full(self.size, -1)
+        edge_of[self.of_edges] = np.arange(edges)
+        moving = [n for n in (*FOLLOWING, "inertia", "damping") if n in self.model.forces]
+        self._room, self.maps = (
+            room,
+            StageMaps(
+                lacking=matrix(2 * reach + 1),
+                by_origin=matrix(2 * reach + 1),
+                by_turn=np.zeros(edges),
+                slides=matrix(0),
+                by_strain=matrix(0),
+                by_kept=matrix(0),
+                by_director=np.zeros((len(problem.raised.edge), 7, 3)),
+                way=np.zeros((3, edges, 3)),
+                edge_of=edge_of,
+                moving=np.array([name in moving for name in NAMES]),
+            ),
+        )
+        self.lack = Lack(
+            matrix=self.maps.lacking,
+            basis=np.zeros((ROUNDS + 1, self.size)),
+            projected=np.zeros((ROUNDS, ROUNDS + 1)),
+            turns=np.zeros((ROUNDS, 2)),
+            rest=np.zeros(ROUNDS + 1),
+            spread=np.zeros(self.size),
+            force=np.zeros(self.size),
+        )
+
+    @property
+    def overfull(self) -> bool:
+        """True if there was too little room for entries of maps; now there is more, and maps are zero."""
+        maps = self.maps
+        lists = maps.lacking, maps.by_origin, maps.slides, maps.by_strain, maps.by_kept
+        most = max(int(of.count[0]) for of in lists)
+        if most > self._room:
+            self.grow_maps(2 * most)
+            return True
+        return False
 
     def begin(self, step: KeptStep) -> None:
         """Take the start of a step, with what acts during it."""
@@ -179,7 +247,18 @@ class StepAgain(Evaluator):
     @property
     def end_rates(self) -> Array:
         """Rates of strains at the end of the stage, shape (n_strain,)."""
-        return self._work.end.strain_rate
+        return self.ended.strain_rate
+
+    @property
+    def speeds(self) -> Array:
+        """Speeds of approach that are in memory during the step, shape (n_pair,)."""
+        return self.speeds_of(self._state)
+
+    def speeds_of(self, state: State) -> Array:
+        """Return the speeds of approach in the memory of a state, shape (n_pair,)."""
+        restitution = self.problem.restitution
+        first = restitution.memory[0] if restitution.exists else 0
+        return state.memory[first : first + len(restitution.rate)]
 
     @property
     def held(self) -> Array:
@@ -190,30 +269,34 @@ class StepAgain(Evaluator):
     @property
     def speeds_of_held(self) -> Array:
         """Velocities of these at the end of the stage, and what they gain by its length, shape (2, n_held, 3)."""
-        constrained, work = self.problem.constrained, self._work
-        gained = (work.end.velocity - work.origin.velocity) / self.stage.momentum_length
-        return np.stack([work.end.velocity, gained])[:, constrained.node[constrained.free >= 0]]
+        constrained, velocity = self.problem.constrained, self.ended.velocity
+        gained = (velocity - self.point.velocity) / self.stage.momentum_length
+        return np.stack([velocity, gained])[:, constrained.node[constrained.free >= 0]]
 
     @property
     def momenta_of_bodies(self) -> Array:
         """Angular momenta of free bodies at the end of the stage, and what they gain by its length, shape (2, n_free,
         3).
         """
-        end, origin = self._work.end.angular_momentum, self._work.origin.angular_momentum
+        end, origin = self.ended.angular_momentum, self.point.angular_momentum
         return np.stack([end, (end - origin) / self.stage.momentum_length])
 
     @property
     def gained_momentum(self) -> Array:
         """Gain of the fluid's momentum over the stage, shape (wet,)."""
-        gained = np.zeros(self.wet)
+        return self.wetted(self.ended.fluid_momentum - self.point.fluid_momentum)
+
+    def wetted(self, rows: Array) -> Array:
+        """Return what the fluid has about nodes and kept directors, shape (n, 3), in the places of its momenta."""
+        found, nodes = np.zeros(self.wet), len(self.of_nodes)
         if self.wet:
-            gained[self.of_nodes] = self._work.end.fluid_momentum - self._work.origin.fluid_momentum
-        return gained
+            found[self.of_nodes], found[self.size :] = rows[:nodes], rows[nodes:].ravel()
+        return found
 
     @property
     def origin_rates(self) -> Array:
         """Rates of strains at its origin, likewise."""
-        return self._work.origin.strain_rate
+        return self.point.strain_rate
 
     def start(self, n: int) -> None:
         """Start stage n, up to the first guess."""
@@ -243,7 +326,7 @@ class StepAgain(Evaluator):
     def follow(self, at: Configuration) -> None:
         """Let forces take from a configuration what they hold fixed."""
         if self._settles:
-            self.select(at, None)
+            self.sums.selected[:] = self._pressing
             follow(self.problem, at, self.stage)
         else:
             self.update_lagged(at)
@@ -252,12 +335,28 @@ class StepAgain(Evaluator):
     def _no_bodies(self) -> Array:
         return np.zeros_like(self.problem.system.body_step)
 
+    def pass_through(self, n: int, end: Configuration) -> None:
+        """Go through stage n, of which only the end counts."""
+        step = self._step
+        pass_stage(self.problem, self._arrays, step.method, self._inputs, self._work, n, step.length, self.places[n])
+        self.places[n + 1] = end
+        self.finish(n)
+
     def finish(self, n: int) -> None:
         """Take the end of stage n."""
         at, work = self.places[n + 1], self._work
         end_stage(self.problem, self._arrays, work, self._inputs, n, at)
         work.start_angle[:] = work.end.angle
         at.total_angle[:] = 0.0
+        self.ended, self.last = work.end, at
+
+    def go_beyond(self, n: int) -> None:
+        """Go from the end of the last stage to that of the step, its point n."""
+        step, places = self._step, (self.places[n], self.places[n + 1])
+        status = move_beyond(self.problem, self._arrays, step.method, self._inputs, self._work, n, *places)
+        if status != READY:
+            raise SimulationError("gradient: a step that was made is not possible once more", step.begin)
+        self.ended, self.last = self.point, places[1]
 
     def gradient(self, n: int) -> Array:
         """Return the gradient of the potential where stage n ended, shape (size,)."""
@@ -268,116 +367,69 @@ class StepAgain(Evaluator):
         """Return the gradient of the last evaluation, shape (size,)."""
         return np.concatenate([self.sums.gradient, self.sums.body.ravel()])
 
-    @property
-    def turned(self) -> list[Array]:
-        """Rotation vectors of free bodies in earlier stages, from their origins, shapes (n_free, 3)."""
-        return [of[self.problem.bodies.body_of_free].copy() for of in self._work.gained_rotation_vector]
-
-    def find(self, n: int, matrices: Callable[[StepAgain, int], Lacking]) -> tuple[Reached, float, Lacking]:
-        """Go to where stage n ended, and factorise the Hessian there; return where, the last correction [m], and what
-        the Hessian lacks there, as `matrices` has it.
+    def find(self, n: int, write_maps: Callable[[StepAgain, int], None]) -> tuple[Reached, float]:
+        """Go to where stage n ended, factorise the Hessian there, and write what it lacks; return where, and the last
+        correction [m].
         """
         work, step, reached = self._work, self._step, self.reached
         self._end.take(step.end)
         between = self._arrays, self._end_arrays, step.method, work, n, step.length
         expect_end(self.problem, *between, self.places[0], self.guesses[n], reached)
         self.go(n, reached)
-        lacking: Lacking = (None, None, None, None)
+        self.lacks = written = False
         for k in range(MOST):
             at = self.places[n + 1]
-            self.evaluate(at, second=True)
-            gradient = self.whole_gradient()
-            shift, simplified = self.factorise(at)
-            if shift or simplified:
-                raise SimulationError("gradient: a step ends where the shape is unstable", self._step.begin)
+            self._factorise_end(at)
             if k and self._settles:
-                lacking = matrices(self, n)
-            travel = -self.solved(n, gradient[:, None], lacking[0])[:, 0]
-            moved = np.abs(travel[self.of_nodes]).max()
-            turned = (
-                np.abs(travel[self.of_edges]).max(initial=0.0),
-                np.abs(travel[self.of_bodies[:, 3:]]).max(initial=0.0),
-            )
-            moved = max(moved, self._size * max(turned), np.abs(travel[self.of_bodies[:, :3]]).max(initial=0.0))
+                gradient = self.sums.gradient.copy(), self.sums.body.copy()
+                write_maps(self, n)
+                written = True
+                self.sums.gradient[:], self.sums.body[:] = gradient
+            moved = correct(self.problem, at, self.lack, self.lacks, self._size)
             if not moved > max(ENOUGH * self._size, self._tolerance * self.stage.length):
                 break
-            self.travel(at, travel, self.spare)
+            move(self.problem, at, 1.0, self.stage, self.spare)
             self.places[n + 1], self.spare = self.spare, at
             self.follow(self.places[n + 1])
-        if lacking[0] is None:
-            lacking = matrices(self, n)
+        if not written:
+            write_maps(self, n)
         at = self.places[n + 1]
         reached.position[:], reached.turn[:] = at.position, at.total_angle - self.guesses[n].total_angle
         reached.body_position[:], reached.body_rotation[:] = at.body_position, at.body_rotation
-        return reached, float(moved), lacking
+        return reached, moved
 
-    def solved(self, n: int, right: Array, lacking: Entries | None) -> Array:
-        """Return the inverse of the factorised Hessian, where stage n ended, and what it lacks, times columns."""
-        problem, sums, found = self.problem, self.sums, np.empty(right.shape)
-        if lacking is not None:
-            lack = self._lack_of(lacking)
-        for k in range(right.shape[1]):
-            sums.gradient[:], sums.body[:] = right[: self._rods, k], right[self._rods :, k].reshape(-1, 6)
-            if lacking is None:
-                solve(problem)
-            else:
-                solve_with_lack(problem, self.places[n + 1], lack, ROUNDED)
-            found[: self._rods, k] = problem.system.step
-            found[self._rods :, k] = problem.system.body_step.ravel()
-        return -found if lacking is None else found
+    def _factorise_end(self, at: Configuration) -> None:
+        """Factorise the Hessian at a configuration, and leave the gradient there."""
+        while (status := factorise_end(self.problem, at, self.stage)) != READY:
+            self._grow(status)
+        outcome = self._storage.outcome
+        self.gap = outcome.gap
+        if outcome.shift or outcome.simplified:
+            raise SimulationError("gradient: a step ends where the shape is unstable", self._step.begin)
 
-    def _lack_of(self, lacking: Entries) -> Lack:
-        """Return entries with scratch, the same as long as there is room."""
-        count, found = len(lacking.row), self._lack
-        if found is None or len(found.row) < count:
-            found = self._lack = Lack(
-                count=np.zeros(1, dtype=np.int64),
-                row=np.zeros(2 * count, dtype=np.int64),
-                column=np.zeros(2 * count, dtype=np.int64),
-                value=np.zeros(2 * count),
-                basis=np.zeros((ROUNDS + 1, self.size)),
-                projected=np.zeros((ROUNDS, ROUNDS + 1)),
-                turns=np.zeros((ROUNDS, 2)),
-                rest=np.zeros(ROUNDS + 1),
-                spread=np.zeros(self.size),
-            )
-        found.count[0] = count
-        found.row[:count], found.column[:count], found.value[:count] = lacking.row, lacking.column, lacking.value
-        return found
+    def write_body_maps(self, n: int, maps: BodyMaps) -> None:
+        """Write the maps of free bodies in stage n."""
+        step = self._step
+        write_body_maps(self.problem, self._arrays, step.method, self._work, n, step.length, self.places[n + 1], maps)
 
     def differentiate_by_laws(self, at: Configuration, differences: StrainDifferences, change: float) -> None:
         """Write how the gradient at a configuration depends on the eigenstrain of each law; see `StrainDifferences`."""
-        self.select(at, self._elastic)
+        self.sums.selected[:] = self._elastic
         differentiate_by_laws(self.problem, self._work, differences, at, change)
 
     def differentiate_by_strains(self, at: Configuration, differences: StrainDifferences, change: float) -> None:
         """Write how the gradient at a configuration depends on strains at the origin; see `StrainDifferences`."""
-        self.select(at, self._elastic)
+        self.sums.selected[:] = self._elastic
         differentiate_by_strains(self.problem, differences, at, self.stage, change)
 
 
-def cross_matrix(v: Array) -> Array:
-    """Return the matrix [v]×, shape (3, 3)."""
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-
-
-def cross_matrices(of: Array) -> Array:
-    """Return the matrices [v]× of vectors, shape (n, 3, 3)."""
-    out = np.zeros((len(of), 3, 3))
-    out[:, 0, 1], out[:, 0, 2], out[:, 1, 2] = -of[:, 2], of[:, 1], -of[:, 0]
-    return out - out.swapaxes(1, 2)
-
-
-def left_jacobian(v: Array) -> Array:
-    """Return by what exp([v]×) turns more for an increment of v."""
-    angle, k = math.sqrt(float(v @ v)), cross_matrix(v)
-    if angle < SMALL:
-        first, second = 0.5 - angle**2 / 24.0, 1.0 / 6.0 - angle**2 / 120.0
-    else:
-        first, second = (1.0 - math.cos(angle)) / angle**2, (angle - math.sin(angle)) / angle**3
-    return np.eye(3) + first * k + second * (k @ k)
-
-
-def rotation_of(v: Array) -> Array:
-    """Return exp([v]×)."""
-    return np.eye(3) + cross_matrix(v) @ left_jacobian(v)
+def _reach(again: StepAgain) -> int:
+    """Return how far apart unknowns of two edges that follow each other are, but for those where a rod closes."""
+    strands = again.problem.strands
+    seen = np.concatenate([again.of_nodes[strands.edge_node], again.of_nodes[strands.edge_node + 1]], axis=1)
+    seen = np.concatenate([seen, again.of_edges[:, None]], axis=1)
+    before, after = strands.joint_a[: strands.bend_count], strands.joint_b[: strands.bend_count]
+    inner = np.maximum(before, after) < len(seen)
+    both = np.concatenate([seen[before[inner]], seen[after[inner]]], axis=1)
+    apart = (both if len(both) else seen).max(axis=1) - (both if len(both) else seen).min(axis=1)
+    return int(np.median(apart))

@@ -1,27 +1,28 @@
-"""Derivatives of a step that was made: forward along motions of its start, and backward from its end.
-
-With Y the positions of nodes, the turns of edges since the start of the step and the strains that have rates, V their
-rates, and an origin (Ȳ, V̄), a stage of length L (momenta: L′) ends where
-
-    g = P ᵀ[𝓜 (Y − Ȳ − L V̄)/(L L′) + 𝓓 (Y − Ȳ)/L] + elasticity, weight, contact = 0,    V = (Y − Ȳ)/L,    P = ∂Y/∂q
-
-with the masses 𝓜, those of raised edges among strains, and the damping 𝓓, viscosity among it. H = ∂g/∂q is that of
-Newton's method, and G what it lacks by the gyroscopic force. So along a motion of the origin
-
-    (H + G) dq = −dg,    dY = P dq,    dV = (dY − dȲ)/L
-
-and backward with the transpose of each line. The maps of a stage are those of `gradients.stage_rates`.
-"""
+"""Derivatives of steps that were made, by columns; see `engine.step_response`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
+from bilayer_core.engine.step_response import (
+    InputRates,
+    StateRates,
+    StepWork,
+    begin_backward,
+    begin_backward_beyond,
+    begin_forward,
+    end_backward,
+    end_forward,
+    end_forward_beyond,
+    go_backward,
+    go_forward,
+)
 from bilayer_core.engine.steps_again import Reached
 from bilayer_core.model.model import Model
+from bilayer_core.simulation.gradients.impact_rates import speeds_at_end
 from bilayer_core.simulation.gradients.stage_rates import StageDerivatives
 from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
 
@@ -44,6 +45,8 @@ class Rates:
         What modes have reached of stimuli, shape (n_mode, n).
     push, strain_push : ndarray
         Rates of velocities, and of rates of strains and of the fluid's momentum, that a history keeps, likewise.
+    kept : ndarray
+        Speeds of approach in the memory of impacts, shape (n_kept, n).
     """
 
     place: Array
@@ -52,12 +55,13 @@ class Rates:
     reached: Array
     push: Array
     strain_push: Array
+    kept: Array
 
     @classmethod
     def zeros(cls, again: StepAgain, columns: int) -> Rates:
         """Return rates of a model without any."""
         strains, modes = again.stage.origin_strain.size, again.transduction.size
-        sizes = again.size, again.size, strains, modes, again.size, strains + again.wet
+        sizes = again.size, again.size, strains, modes, again.size, strains + again.wet, len(again.speeds)
         return cls(*(np.zeros((size, columns)) for size in sizes))
 
 
@@ -97,41 +101,74 @@ class StepRates:
     """
 
     def __init__(self, model: Model, agains: Sequence[StepAgain]):
-        self._agains = agains
-        self._of = StageDerivatives(model, agains[0])
+        self._agains, again, stages = agains, agains[0], len(agains)
+        self._of = StageDerivatives(model, agains)
         self.constants = self._of.constants
         self.residual = 0.0
+        rates, acts = Rates.zeros(again, 1), Inputs.zeros(again, stages, 1)
+        self._start, self._end = (
+            StateRates(**{name: 0.0 * getattr(rates, name)[:, 0] for name in StateRates.names}) for _ in range(2)
+        )
+        size, whole = self.constants.size, self.constants.whole
+        self._acts = InputRates(
+            first=acts.first[:, 0],
+            stimulus=acts.stimulus[:, :, 0],
+            gain=acts.gain[:, 0],
+            direct=np.zeros((stages, size)),
+        )
+        rows = {name: np.zeros((stages, whole)) for name in ("end", "end_speed", "origin", "origin_speed")}
+        vectors = {name: np.zeros(whole) for name in ("first", "speed", "push", "change", "mass", "guess")}
+        self._work = StepWork(
+            **rows,
+            **vectors,
+            place=np.zeros((stages, size)),
+            right=np.zeros(size),
+            moved=np.zeros(size),
+            before=np.zeros(len(again.of_edges)),
+            reached=np.zeros(len(self.constants.record.channel)),
+        )
 
     def take(self, step: KeptStep) -> list[Reached]:
         """Go to a step; return where its stages ended."""
-        self.step, self._stages, reached = step, [], []
-        stages = len(step.method.couplings)
-        for n, again in enumerate(self._agains[:stages]):
-            again.begin(step)
-            for earlier in range(n):
-                again.start(earlier)
-                again.go(earlier, reached[earlier])
-                again.finish(earlier)
+        self.step, self._count, reached = step, step.method.couplings.shape[1], []
+        for n, again in enumerate(self._agains[: self._count]):
+            self._begin(again, n)
             again.start(n)
             if n == 0:
-                self._start_strains = self._of.strains(again, again.places[0])
-                if again.wet:
-                    self._start_momentum = self._of.follower.momentum(again, again.places[0], step.start.velocity)
-            place, correction, followed = again.find(n, self._of.follower.matrices)
+                self._of.write_start(again, step)
+            place, correction = again.find(n, self._of.follower.write)
             reached.append(place)
             self.residual = max(self.residual, correction / step.length)
-            self._stages.append(self._of.of(again, n, step, followed))
+            self._of.write(again, n, step)
+        self.ended, again = reached[-1].position, self._agains[self._count - 1]
+        if step.beyond:
+            again = self._agains[self._count]
+            self._begin(again, self._count)
+            again.go_beyond(self._count)
+            self.ended = again.places[self._count + 1].position
+            self._of.write_beyond(again, self._count, step)
+        elif len(again.speeds):
+            again.finish(self._count - 1)
+        self._remembered = speeds_at_end(again)[1:] if len(again.speeds) else (np.zeros(0), np.zeros(0))
         return reached
 
-    @property
-    def _forgotten(self) -> slice:
-        """Rows of rates of rates of strains that a step leaves without which the method has no history."""
-        size, raised = self.constants.size, self._agains[0].problem.raised
-        if self.step.method.history:
-            return slice(0, 0)
-        return slice(size, size + (raised.first if raised.exists else self.constants.strains))
+    def _begin(self, again: StepAgain, n: int) -> None:
+        """Go to the start of stage n."""
+        again.begin(self.step)
+        for earlier in range(n):
+            again.pass_through(earlier, self._agains[earlier].places[earlier + 1])
 
-    # forward
+    def _stage(self, n: int) -> tuple:
+        """Return what pieces take of stage n."""
+        again, of = self._agains[n], self._of.stages[n]
+        at = again.problem, again.places[n + 1], again.stage, self.step.method, again.lack, again.lacks
+        return *at, self.constants.record, again.maps, of.elastic, of.bodies
+
+    def _beyond(self) -> tuple:
+        """Return what pieces take of the end of the step beyond its last stage."""
+        n, again, of = self._count, self._agains[self._count], self._of.stages[self._count]
+        at = again.problem, again.places[n + 1], self.step.method
+        return *at, self.constants.record, again.maps, of.elastic, of.bodies
 
     def forward(self, start: Rates, acts: Inputs, direct: Sequence[Array] | None = None) -> Rates:
         """Return how the end of the step changes.
@@ -144,192 +181,49 @@ class StepRates:
         direct : sequence of ndarray, optional
             Of the gradient at the ends of stages by parameters alone, each of shape (size, n).
         """
-        constants, method, h = self.constants, self.step.method, self.step.length
-        size, edges = constants.size, self._agains[0].of_edges
-        fluid = constants.of_fluid
-        none = np.zeros((constants.whole - fluid.start, start.place.shape[1]))
-        first = np.concatenate([constants.free * start.place, self._start_strains @ start.place, none])
-        first[edges] = 0.0
-        speed = np.concatenate([constants.moves * start.speed, start.strain_rate, none])
-        if len(none):
-            by_place, by_speed = self._start_momentum
-            speed[fluid] = by_place @ start.place + by_speed @ speed[:size]
-        push = np.concatenate([start.push, start.strain_push])
-        place, turn = start.place, np.zeros((len(edges), start.place.shape[1]))
-        gained: list[tuple[Array, Array]] = []
-        turned: list[tuple[Array, Array]] = []
-        for n, stage in enumerate(self._stages):
-            origin, origin_speed = first.copy(), speed.copy()
-            for coupling, (of_place, of_speed) in zip(method.couplings[n], gained, strict=False):
-                origin += coupling * of_place
-                origin_speed += coupling * of_speed
-            if method.history:
-                origin += method.along[n] * h * speed + method.bend * h * h * push
-                origin_speed += method.momenta[n] * h * push
-            if bodies := stage.bodies:
-                bodies.turn_origin(first, origin, turned)
-                if method.history:
-                    bodies.turn_by_history(first, speed, push, origin)
-                ahead = bodies.predict(origin, origin_speed)
-            reached = stage.lag[0][:, None] * start.reached
-            if len(constants.channel):
-                reached += stage.lag[1][:, None] * acts.first[constants.channel]
-                reached += stage.lag[2][:, None] * acts.stimulus[n, constants.channel]
-            of_mass = constants.masses(origin)
-            change = -(of_mass + stage.length * constants.masses(origin_speed)) / stage.momentum_length
-            change = (change - constants.dissipation(origin, of_mass)) / stage.length
-            change[constants.of_strains] -= stage.resistance * origin[constants.of_strains] / stage.length
-            right = change[:size] + stage.strains.pull_back(change[constants.of_strains])
-            if stage.momentum:
-                right -= origin_speed[fluid] / stage.momentum_length
-            before = np.zeros_like(turn)
-            if stage.way:
-                guess = constants.free * (origin[:size] + stage.length * origin_speed[:size])
-                if bodies:
-                    bodies.guess(origin, origin_speed, ahead, guess)
-                before = turn - place[edges] + constants.along(stage.way[0], place)
-                before += constants.along(stage.way[1], guess)
-                right += stage.by_turn @ before
-            if stage.by_origin is not None:
-                right += stage.by_origin @ origin[:size]
-            if stage.by_director is not None:
-                right += stage.by_director @ origin[constants.of_strains]
-            if bodies:
-                right = bodies.gather(right)
-                bodies.push(ahead, right)
-            if len(stage.law_by_gain):
-                laws = stage.law_by_mode @ reached + stage.law_by_gain[:, None] * acts.gain
-                right += stage.by_laws @ laws
-            if direct is not None:
-                right += direct[n]
-            moved = -self._agains[n].solved(n, constants.free * right, stage.lacking)
-            if bodies:
-                moved = bodies.spread(moved)
-            end = np.concatenate([moved, stage.strains @ moved, none])
-            if stage.way:
-                end[edges] = before + moved[edges] + constants.along(stage.way[2], moved)
-            end_speed = (end - origin) / stage.length
-            if bodies:
-                bodies.end(end, origin_speed, ahead, end_speed)
-                turned.append((end, origin))
-            if stage.momentum:
-                end_speed[fluid] = stage.momentum[0] @ moved + stage.momentum[1] @ end_speed[:size]
-            gained.append((end - origin, end_speed - origin_speed))
-            place, turn = moved, end[edges]
-        kept = (end_speed - origin_speed) / stage.momentum_length
-        kept = (kept - method.carry * push) / (1.0 - method.carry)
-        kept[self._forgotten] = 0.0
-        return Rates(place, end_speed[:size], end_speed[constants.of_strains], reached, kept[:size], kept[size:])
-
-    # backward
+        columns, own, work, last = start.place.shape[1], self._acts, self._work, self._count - 1
+        again, method, first = self._agains[last], self.step.method, self._of.start.elastic
+        points, end = len(method.couplings), Rates.zeros(again, columns)
+        own.direct[:] = 0.0
+        for k in range(columns):
+            for part in fields(Rates):
+                getattr(self._start, part.name)[:] = getattr(start, part.name)[:, k]
+            own.first[:], own.gain[:] = acts.first[:, k], acts.gain[:, k]
+            own.stimulus[:points] = acts.stimulus[:points, :, k]
+            for n, of in enumerate(direct or ()):
+                own.direct[n] = of[:, k]
+            constants = self.constants.record
+            begin_forward(again.problem, method, constants, first.strains, first.fluid, self._start, work)
+            for n in range(self._count):
+                go_forward(*self._stage(n), self._start, own, work, n, self.step.length)
+            if self.step.beyond:
+                end_forward_beyond(*self._beyond(), self._start, self._end, own, work, self._count)
+            else:
+                end_forward(again.problem, again.stage, method, self._end, work, last)
+            for part in fields(Rates):
+                getattr(end, part.name)[:, k] = getattr(self._end, part.name)
+        by_kept, by_rate = self._remembered
+        end.kept = by_kept[:, None] * start.kept + by_rate[:, None] * end.strain_rate[self.constants.of_gaps]
+        return end
 
     def backward(self, end: Rates) -> tuple[Rates, Inputs, list[Array]]:
         """Return the derivatives by the start of the step, by what acts, and by the gradients where stages ended, from
-        those by the end of the step.
+        those by the end of the step, one column.
         """
-        constants, method, h = self.constants, self.step.method, self.step.length
-        size, edges, columns = constants.size, self._agains[0].of_edges, end.place.shape[1]
-        start = Rates.zeros(self._agains[0], columns)
-        acts = Inputs.zeros(self._agains[0], len(self._stages), columns)
-        push, fluid = np.zeros((constants.whole, columns)), constants.of_fluid
-        first, speed = np.zeros_like(push), np.zeros_like(push)
-        count = len(self._stages)
-        ends = [np.zeros_like(push) for _ in range(count)]
-        end_speeds = [np.zeros_like(push) for _ in range(count)]
-        origins = [np.zeros_like(push) for _ in range(count)]
-        origin_speeds = [np.zeros_like(push) for _ in range(count)]
-        places = [np.zeros((size, columns)) for _ in range(count)]
-        direct: list[Array] = [np.zeros((size, columns))] * count
-        places[-1] += end.place
-        kept = np.concatenate([end.push, end.strain_push]) / (1.0 - method.carry)
-        kept[self._forgotten] = 0.0
-        push -= method.carry * kept
-        end_speeds[-1] += kept / self._stages[-1].momentum_length
-        end_speeds[-1][:size] += end.speed
-        end_speeds[-1][constants.of_strains] += end.strain_rate
-        origin_speeds[-1] -= kept / self._stages[-1].momentum_length
-        for n in reversed(range(count)):
-            stage = self._stages[n]
-            of_momentum = end_speeds[n][fluid].copy()
-            end_speeds[n][fluid] = 0.0
-            if stage.momentum:
-                end_speeds[n][:size] += stage.momentum[1].T @ of_momentum
-                places[n] += stage.momentum[0].T @ of_momentum
-            if bodies := stage.bodies:
-                ahead = bodies.end_back(ends[n], origin_speeds[n], end_speeds[n])
-            ends[n] += end_speeds[n] / stage.length
-            origins[n] -= end_speeds[n] / stage.length
-            moved = places[n] + ends[n][:size] + stage.strains.pull_back(ends[n][constants.of_strains])
-            before = np.zeros((len(edges), columns))
-            if stage.way:
-                moved += constants.along_back(stage.way[2], ends[n][edges])
-                before += ends[n][edges]
-            transposed = None if stage.lacking is None else stage.lacking.T
-            moved = bodies.gather(moved) if bodies else constants.free * moved
-            right = direct[n] = -self._agains[n].solved(n, moved, transposed)
-            spread = bodies.spread(right) if bodies else right
-            change = np.concatenate([spread, stage.strains @ spread, np.zeros_like(of_momentum)])
-            if bodies:
-                ahead += bodies.push_back(right)
-            if stage.momentum:
-                origin_speeds[n][fluid] -= spread / stage.momentum_length
-            of_mass = constants.masses(change)
-            drag = constants.dissipation(change, of_mass) / stage.length
-            of_mass = of_mass / (stage.length * stage.momentum_length)
-            origins[n] -= of_mass + drag
-            origins[n][constants.of_strains] -= stage.resistance * change[constants.of_strains] / stage.length
-            origin_speeds[n] -= stage.length * of_mass
-            reached = end.reached if n + 1 == count else np.zeros_like(end.reached)
-            if len(stage.law_by_gain):
-                laws = stage.by_laws.T @ right
-                reached = reached + stage.law_by_mode.T @ laws
-                acts.gain += stage.law_by_gain[:, None] * laws
-            start.reached += stage.lag[0][:, None] * reached
-            if len(constants.channel):
-                np.add.at(acts.first, constants.channel, stage.lag[1][:, None] * reached)
-                np.add.at(acts.stimulus[n], constants.channel, stage.lag[2][:, None] * reached)
-            if stage.by_origin is not None:
-                origins[n][:size] += stage.by_origin.T @ spread
-            if stage.by_director is not None:
-                origins[n][constants.of_strains] += stage.by_director.T @ spread
-            if stage.way:
-                before += stage.by_turn.T @ spread
-                guess = constants.along_back(stage.way[1], before)
-                if bodies:
-                    bodies.guess_back(guess, origins[n], origin_speeds[n], ahead)
-                guess = constants.free * guess
-                origins[n][:size] += guess
-                origin_speeds[n][:size] += stage.length * guess
-                of_start = constants.along_back(stage.way[0], before)
-                of_start[edges] -= before
-                if n:
-                    places[n - 1] += of_start
-                    ends[n - 1][edges] += before
-                else:
-                    start.place += of_start
-            if bodies:
-                bodies.predict_back(origins[n], origin_speeds[n], ahead)
-                if method.history:
-                    bodies.turn_by_history_back(first, speed, push, origins[n])
-                bodies.turn_origin_back(first, origins[n], ends, origins)
-            if method.history:
-                speed += method.along[n] * h * origins[n]
-                push += method.bend * h * h * origins[n] + method.momenta[n] * h * origin_speeds[n]
-            first += origins[n]
-            speed += origin_speeds[n]
-            for j in range(n):
-                coupling = method.couplings[n, j]
-                ends[j] += coupling * origins[n]
-                origins[j] -= coupling * origins[n]
-                end_speeds[j] += coupling * origin_speeds[n]
-                origin_speeds[j] -= coupling * origin_speeds[n]
-        first[edges] = 0.0
-        start.place += constants.free * first[:size] + self._start_strains.pull_back(first[constants.of_strains])
-        if fluid.stop > fluid.start:
-            by_place, by_speed = self._start_momentum
-            start.place += by_place.T @ speed[fluid]
-            speed[:size] += by_speed.T @ speed[fluid]
-        start.speed += constants.moves * speed[:size]
-        start.strain_rate += speed[constants.of_strains]
-        start.push, start.strain_push = push[:size], push[size:]
-        return start, acts, direct
+        work, acts, last = self._work, self._acts, self._count - 1
+        again, method, first = self._agains[last], self.step.method, self._of.start.elastic
+        for part in fields(Rates):
+            getattr(self._end, part.name)[:] = getattr(end, part.name)[:, 0]
+        by_kept, by_rate = self._remembered
+        self._end.strain_rate[self.constants.of_gaps] += by_rate * self._end.kept
+        if self.step.beyond:
+            begin_backward_beyond(*self._beyond(), self._end, self._start, acts, work, self._count)
+        else:
+            begin_backward(again.problem, again.stage, method, self._end, self._start, acts, work, last)
+        for n in reversed(range(self._count)):
+            go_backward(*self._stage(n), self._end, self._start, acts, work, n, self.step.length)
+        end_backward(again.problem, self.constants.record, first.strains, first.fluid, self._start, work)
+        self._start.kept[:] += by_kept * self._end.kept
+        start = Rates(*(getattr(self._start, part.name)[:, None].copy() for part in fields(Rates)))
+        inputs = Inputs(acts.first[:, None], acts.stimulus[: len(method.couplings), :, None], acts.gain[:, None])
+        return start, inputs, [of[:, None] for of in acts.direct[: self._count]]

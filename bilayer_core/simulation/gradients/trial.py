@@ -17,7 +17,8 @@ from bilayer_core.observed.frame import Description
 from bilayer_core.scene.loader import load_content, scene_content
 from bilayer_core.simulation.gradients.course import Course
 from bilayer_core.simulation.gradients.nearby import Builders, described, values_of
-from bilayer_core.simulation.gradients.run_response import Number, RunResponse
+from bilayer_core.simulation.gradients.run_response import RunResponse
+from bilayer_core.simulation.gradients.varied_numbers import Number
 
 Array = np.ndarray
 PART = 1e-2

@@ -12,6 +12,7 @@ from bilayer_core.scene.overrides import read_overrides
 from bilayer_core.simulation.at_rest import stepper_and_state
 from bilayer_core.simulation.gradients.nearby import values_of
 from bilayer_core.simulation.simulator import Simulator
+from bilayer_core.verification.validate.impacts import thrown
 from bilayer_core.verification.validate.validation_case import Case
 
 TOLERANCE = 1e-14
@@ -60,7 +61,7 @@ def height(name: str, overrides: dict[str, Any], stimuli: dict[str, float], to: 
 
 
 def end_of_run(
-    name: str, overrides: dict[str, Any], duration: float, to: str, of: str = "com", step: float = 1e-4
+    name: str | dict, overrides: dict[str, Any], duration: float, to: str, of: str = "com", step: float = 1e-4
 ) -> Callable:
     """Measure how a quantity at the end of a run depends on a parameter: its largest component."""
 
@@ -75,7 +76,7 @@ def end_of_run(
 
 
 def differences_of_runs(
-    name: str, overrides: dict[str, Any], steps: Steps, to: str, step: float, of: Sequence[str]
+    name: str | dict, overrides: dict[str, Any], steps: Steps, to: str, step: float, of: Sequence[str]
 ) -> list[np.ndarray]:
     """Return differences of quantities at the end of two runs with the steps of another, over the parameter, which
     is `step` of its value away on either side.
@@ -161,20 +162,26 @@ LEVEL, GAIN = "stimuli.swelling.schedule.to", f"{ACTIVE}.eigenstrain.gain"
 SWELLING = HANGING | {LEVEL: 0.8}
 VISCOUS = {"materials.active.retardation_time": 0.05}
 EULER = {"solver.integrator": "implicit_euler", "solver.dt": 0.004, "solver.tolerance": None}
+WATER = {"density": 1000.0, "velocity": [0, 0.05, 0], "drag_along": 0.01, "drag_across": 1.0, "added_mass": True}
+UNLIKE_IN_WATER = SWELLING | {"materials.active.youngs_modulus": 3e7, "fluid": WATER}
 STRIDE = {"stimuli.humidity.schedule.period": 0.4}
 GRIP = EULER | {"solver.dt": 0.001, "stimuli.humidity.schedule.start": 0, "stimuli.humidity.schedule.end": 0.05}
+THROWN, BALL = thrown(1e9, 3, restitution=0.5), "body/ball/position"
 RUNS: dict[str, tuple[Any, ...]] = {
     "stimulus": ("bending", SWELLING, 0.2, LEVEL),
     "gain in space": ("bending", SWELLING | IN_SPACE, 0.2, GAIN),
     "modulus, two rods": ("bending", SWELLING | TWO_RODS, 0.1, "materials.active.youngs_modulus"),
     "thickness": ("bending", SWELLING, 0.2, f"{ACTIVE}.thickness"),
     "length, implicit euler": ("bending", SWELLING | EULER, 0.1, "rods.strip.path.length", "com", 1e-5),
+    "gain, implicit midpoint": ("bending", SWELLING | {"solver.integrator": "implicit_midpoint"}, 0.1, GAIN),
     "viscosity": ("bending", SWELLING | VISCOUS, 0.2, "materials.active.retardation_time"),
     "hinges/density": ("arch", {}, 0.005, "materials.passive.density"),
     "starts at rest/gain": ("bending", SWELLING | {"start": "settle"}, 0.05, GAIN),
+    "impact/restitution": (THROWN, {}, 5e-4, "contact.restitution", BALL),
     "fibres/gravity": ("chiral_pod", {}, 0.02, "gravity.2"),
     "swimmer/density of the fluid": ("swimming", {}, 0.01, "fluid.density"),
     "added mass/density of the fluid": ("flagellum", {}, 0.05, "fluid.density"),
+    "added mass of unlike layers/density of the fluid": ("bending", UNLIKE_IN_WATER, 0.05, "fluid.density"),
     "drag/density of the fluid": ("flagellum", {"fluid.added_mass": False}, 0.05, "fluid.density"),
 }
 RUBBING: dict[str, tuple[Any, ...]] = {
