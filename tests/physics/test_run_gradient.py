@@ -88,6 +88,11 @@ SPUN = HANGING | SPACE | MIDPOINT | {"bodies.wall.motion": SPINNING, LAG: 0.05}
 OFF_CURVE = HANGING | {THICKNESS: 1.5e-4, DENSITY: 2000.0}
 PUSHED_OFF = OFF_CURVE | SPACE | {"loads": [JET], "solver.integrator": "sdirk2"}
 WADES = PUSHED_OFF | {MODULUS: 3e7, "fluid": WATER | {"added_mass": True}}
+FIELD = {"stimulus": "swelling", "partition": 0.5, "top": {}}
+VARIED = {"passive": 2e-5, "active": {"at": [0, 0.4, 1], "value": [1e-5, 2e-5, 5e-5]}}
+SOAKS = HANGING | {"rods.strip.diffusion": FIELD | {"diffusivity": {"passive": 2e-5, "active": 3e-5}}}
+VARIES = HANGING | {"rods.strip.diffusion": FIELD | {"diffusivity": VARIED}}
+DIFFUSIVITY = "rods.strip.diffusion.diffusivity"
 RESTS = {"start": "settle", "stimuli.swelling.schedule.from": 0.3}
 CASES = {
     "in a plane": ("bending", HANGING, 0.2, [GAIN, LEVEL, TIME, MODULUS, THICKNESS, "gravity.2", LENGTH]),
@@ -99,6 +104,13 @@ CASES = {
     "generalised alpha": ("bending", HANGING | ALPHA | VISCOUS | SPACE, 0.1, [GAIN, MODULUS, THICKNESS]),
     "layers that become unlike": ("bending", HANGING | UNLIKE, 0.1, [MODULUS, DENSITY]),
     "a lag": ("bending", HANGING | {LAG: 0.05}, 0.2, [GAIN, LEVEL, LAG]),
+    "diffusion": (
+        "bending",
+        SOAKS,
+        0.05,
+        [LEVEL, THICKNESS, f"{DIFFUSIVITY}.active", "rods.strip.diffusion.partition"],
+    ),
+    "diffusion that varies": ("bending", VARIES, 0.05, [GAIN, LEVEL, f"{DIFFUSIVITY}.active.value.1"]),
     "masses off the curve": ("bending", OFF_CURVE, 0.1, [THICKNESS, LENGTH]),
     "masses off the curve that turn": ("bending", PUSHED_OFF, 0.05, [GAIN, THICKNESS, "loads.0.force.2"]),
     "added mass of unlike layers": ("bending", WADES, 0.05, [GAIN, THICKNESS, "loads.0.force.2"]),
@@ -220,6 +232,7 @@ BACK = {
     "in a plane": ("bending", HANGING, 0.1, [GAIN, LEVEL, THICKNESS, LENGTH]),
     "in space": ("bending", HANGING | SPACE | VISCOUS, 0.1, [GAIN, LEVEL, MODULUS, VISCOSITY]),
     "fibres in space": ("chiral_pod", {}, 0.02, ["gravity.2"]),
+    "diffusion that varies": ("bending", VARIES, 0.05, [LEVEL, f"{DIFFUSIVITY}.passive"]),
     "generalised alpha": ("bending", HANGING | ALPHA | VISCOUS, 0.1, [GAIN, MODULUS]),
     "contact": ("bending", ON_A_POST, 0.2, [LEVEL, "obstacles.post.radius"]),
     "friction": ("jumping", {}, 0.03, ["gravity.2"]),

@@ -55,12 +55,15 @@ class KeptStep:
     method : Method
     spread : ndarray
         Contacts that friction spread in its stages; see `Engine.spread`.
+    decided : tuple of ndarray
+        Decisions of varied diffusion at its points, if there is any; see `engine.varied_diffusion`.
     """
 
     start: State
     end: State
     method: Method
     spread: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    decided: tuple[Array, ...] = ()
 
     @property
     def begin(self) -> float:
@@ -231,8 +234,17 @@ class StepAgain(Evaluator):
         """Rates of strains at its origin, likewise."""
         return self.point.strain_rate
 
+    def decide(self, n: int) -> None:
+        """Let fields make the steps that were decided at point n, if they are known."""
+        varied, decided = self.problem.varied_fields, self._step.decided
+        if varied.exists:
+            varied.follows[0] = len(decided) > 0
+            if decided:
+                varied.decided[:] = decided[n]
+
     def start(self, n: int) -> None:
         """Start stage n, up to the first guess."""
+        self.decide(n)
         step, places, origin = self._step, (self.places[n], self.guesses[n]), self.point
         before = origin.vectors.copy(), origin.rotation.copy()
         while True:
@@ -278,6 +290,7 @@ class StepAgain(Evaluator):
 
     def go_beyond(self, n: int) -> None:
         """Go from the end of the last stage to that of the step, its point n."""
+        self.decide(n)
         step, places = self._step, (self.places[n], self.places[n + 1])
         status = move_beyond(self.problem, self._arrays, step.method, self._inputs, self._work, n, *places)
         if status != READY:

@@ -109,7 +109,7 @@ class StepRates:
 
     def take(self, step: KeptStep) -> list[Reached]:
         """Go to a step; return where its stages ended."""
-        self.step, self._stages, reached = step, [], []
+        self.step, self._stages, reached, decided = step, [], [], []
         stages = step.method.couplings.shape[1]
         for n, again in enumerate(self._agains[:stages]):
             again.begin(step)
@@ -118,6 +118,8 @@ class StepRates:
                 again.go(earlier, reached[earlier])
                 again.finish(earlier)
             again.start(n)
+            if again.problem.varied_fields.exists:
+                decided.append(again.problem.varied_fields.decided.copy())
             if n == 0:
                 self._start_strains = self._of.strains(again, again.places[0])
                 if again.wet:
@@ -137,11 +139,14 @@ class StepRates:
                 again.go(n, place)
                 again.finish(n)
             again.go_beyond(stages)
+            if again.problem.varied_fields.exists:
+                decided.append(again.problem.varied_fields.decided.copy())
             self.ended = again.places[stages + 1].position
             self._end = self._of.beyond(again, stages, step)
         elif len(again.speeds):
             again.finish(stages - 1)
         _, *self._remembered = speeds_at_end(again)
+        self.step = replace(step, decided=tuple(decided))
         return reached
 
     @property

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bilayer_core.engine.varied_diffusion import FieldDifferences, differentiate_field
 from bilayer_core.scene.transduction import lagged
 from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
 
@@ -13,6 +14,8 @@ if TYPE_CHECKING:
     from bilayer_core.simulation.gradients.step_rates import Inputs, Rates
 
 Array = np.ndarray
+CHANGE = 1e-6
+"""Of a stimulus, over what is reached and asked for, by which varied diffusion is differentiated."""
 
 
 class TransductionRates:
@@ -22,17 +25,28 @@ class TransductionRates:
         drives, inputs, state = again.problem.drives, again.inputs, step.start
         self._point, self._channel = n, np.repeat(drives.field_channel, np.diff(drives.field_first))
         self._lag = np.zeros((3, len(self._channel), 1))  # by what was reached, by the first stimulus and by the last
-        for m, channel in enumerate(self._channel):
-            own = state.transduction[m], inputs.first[channel], inputs.stimulus[n, channel]
-            lags = float(drives.mode_rising[m]), float(drives.mode_falling[m])
-            lag = lags[0] if own[2] > own[0] else lags[1]  # on either side of it
-            for k in range(3):
-                unit = [float(j == k) for j in range(3)]
-                self._lag[k, m] = lagged(*unit, lag, lag, float(inputs.elapsed[n]))
+        self._by_others: list[tuple[slice, Array]] = []  # of modes of a field, by what all of them had reached
+        varied, elapsed = again.problem.varied_fields, float(inputs.elapsed[n])
+        for f, channel in enumerate(drives.field_channel):
+            own = slice(int(drives.field_first[f]), int(drives.field_first[f + 1]))
+            first, last = inputs.first[channel], inputs.stimulus[n, channel]
+            if varied.exists and varied.number[f] >= 0:
+                slope = _slope_of_field(again, f, state.transduction, np.array([first, last]), elapsed)
+                self._by_others.append((own, slope[:, :-2]))
+                self._lag[1:, own, 0] = slope[:, -2:].T
+                continue
+            for m in range(own.start, own.stop):
+                rises = last > state.transduction[m]
+                lag = float((drives.mode_rising if rises else drives.mode_falling)[m])  # on either side of it
+                for k in range(3):
+                    unit = [float(j == k) for j in range(3)]
+                    self._lag[k, m] = lagged(*unit, lag, lag, elapsed)
 
     def forward(self, start: Rates, acts: Inputs) -> Array:
         """Return rates of what is reached."""
         found = self._lag[0] * start.reached
+        for own, slope in self._by_others:
+            found[own] = slope @ start.reached[own]
         if len(self._channel):
             found += self._lag[1] * acts.first[self._channel]
             found += self._lag[2] * acts.stimulus[self._point, self._channel]
@@ -41,6 +55,17 @@ class TransductionRates:
     def backward(self, reached: Array, start: Rates, acts: Inputs) -> None:
         """Add derivatives by what they come from."""
         start.reached += self._lag[0] * reached
+        for own, slope in self._by_others:
+            start.reached[own] += slope.T @ reached[own]
         if len(self._channel):
             np.add.at(acts.first, self._channel, self._lag[1] * reached)
             np.add.at(acts.stimulus[self._point], self._channel, self._lag[2] * reached)
+
+
+def _slope_of_field(again: StepAgain, f: int, state: Array, stimulus: Array, elapsed: float) -> Array:
+    """Return how a field depends on its modes, as they were, and on its stimulus; see `FieldDifferences`."""
+    size = int(np.diff(again.problem.drives.field_first)[f])
+    found = FieldDifferences(start=state.copy(), end=state.copy(), stimulus=stimulus, slope=np.zeros((size, size + 2)))
+    change = CHANGE * (max(np.abs(state).max(), np.abs(stimulus).max()) or 1.0)
+    differentiate_field(again.problem, found, f, elapsed, change)
+    return found.slope
