@@ -112,9 +112,6 @@ class RunResponse:
         reasons = [f"the force {name!r}" for name in others]
         if "added mass" in model.forces and any(len(m.couplings) > m.couplings.shape[1] for m in methods):
             reasons.append("added mass with an integrator whose steps end beyond their last stage")
-        problem = self._stepper.engine.problem
-        if problem.light.exists:
-            reasons.append("light")
         if reasons:
             raise InputError(f"gradient: a run is not differentiated through {', '.join(reasons)}")
 
@@ -286,7 +283,7 @@ class RunResponse:
         if number.rates is None:
             state.strain_rate += way * along.strain_rate[:, k]
         speeds = evaluator.speeds_of(state)
-        speeds += way * along.kept[:, k]
+        speeds += way * along.kept[: len(speeds), k]
         state.transduction += way * along.reached[self._varied.modes(model), k]
         gains = model.drives.law_gain.copy()
         try:

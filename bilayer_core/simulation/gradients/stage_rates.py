@@ -25,6 +25,7 @@ from bilayer_core.simulation.gradients.body_rates import BodyRates, drag_by_orig
 from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.followed import FOLLOWING, Followed
 from bilayer_core.simulation.gradients.impact_rates import by_impacts, slopes_of_gaps
+from bilayer_core.simulation.gradients.light_rates import slopes_of_light
 from bilayer_core.simulation.gradients.mechanism_rates import resistances, slopes_of_motions
 from bilayer_core.simulation.gradients.step_again import KeptStep, Lacking, StepAgain, cross_matrices
 from bilayer_core.simulation.gradients.transduction_rates import TransductionRates
@@ -344,8 +345,10 @@ class StageDerivatives:
             slopes = own if slopes is None else own + slopes
         return Strains(constants, again, at, slopes)
 
-    def of(self, again: StepAgain, n: int, step: KeptStep, followed: Lacking) -> StageRates:
-        """Return the maps of stage n of a step; what its Hessian lacks by forces that follow is known."""
+    def of(self, again: StepAgain, n: int, step: KeptStep, followed: Lacking, lit: Array) -> StageRates:
+        """Return the maps of stage n of a step; what its Hessian lacks by forces that follow, and how light at its
+        start depends on places, are known.
+        """
         constants, stage, at = self.constants, again.stage, again.places[n + 1]
         found = StageRates(stage.length, stage.momentum_length, self.strains(again, at), self._by_laws(again, at))
         if again.of_bodies.size:
@@ -376,17 +379,23 @@ class StageDerivatives:
             slope = 1.0 - (laws / drives.law_saturation) ** 2
             found.law_by_mode = (slope * drives.law_gain)[:, None] * constants.followed
             found.law_by_gain = slope * (constants.followed @ again.transduction - drives.law_reference)
-        found.transduction = TransductionRates(again, n, step)
+        found.transduction = TransductionRates(again, n, step, lit)
         return found
 
-    def beyond(self, again: StepAgain, n: int, step: KeptStep) -> EndRates:
+    def beyond(self, again: StepAgain, n: int, step: KeptStep, lit: Array) -> EndRates:
         """Return the maps of the end of a step beyond its last stage, its point n."""
         at, bodies, way = again.places[n + 1], None, ()
         if again.of_bodies.size:
             bodies = BodyRates(again, at, step.method.couplings[n, :n], again.turned[:n])
         if self.constants.in_space:
             way = _holonomy(len(self.constants.spin_inertia), again.places[n], at)
-        return EndRates(TransductionRates(again, n, step), bodies, way)
+        return EndRates(TransductionRates(again, n, step, lit), bodies, way)
+
+    def light(self, again: StepAgain, at: Configuration) -> Array:
+        """Return how what elements see of light depends on places, shape (2 n_lit, size)."""
+        if not again.problem.light.exists:
+            return np.zeros((0, self.constants.size))
+        return slopes_of_light(again, at, self.constants.free[:, 0])
 
     def _by_laws(self, again: StepAgain, at: Configuration) -> Array:
         """Return ∂g/∂η, shape (size, n_law)."""

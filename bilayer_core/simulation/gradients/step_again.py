@@ -186,6 +186,11 @@ class StepAgain(Evaluator):
         return self.ended.strain_rate
 
     @property
+    def kept(self) -> int:
+        """How much a step keeps for the next: speeds of approach, and rates of what elements see of light."""
+        return len(self.problem.restitution.rate) + 2 * len(self.problem.light.law)
+
+    @property
     def speeds(self) -> Array:
         """Speeds of approach that are in memory during the step, shape (n_pair,)."""
         return self.speeds_of(self._state)

@@ -46,7 +46,7 @@ class Rates:
     push, strain_push : ndarray
         Rates of velocities, and of rates of strains and of the fluid's momentum, that a history keeps, likewise.
     kept : ndarray
-        Speeds of approach in the memory of impacts, shape (n_kept, n).
+        Speeds of approach in the memory of impacts, and rates of what elements see of light, shape (n_kept, n).
     """
 
     place: Array
@@ -61,7 +61,7 @@ class Rates:
     def zeros(cls, again: StepAgain, columns: int) -> Rates:
         """Return rates of a model without any."""
         strains, modes = again.stage.origin_strain.size, again.transduction.size
-        sizes = again.size, again.size, strains, modes, again.size, strains + again.wet, len(again.speeds)
+        sizes = again.size, again.size, strains, modes, again.size, strains + again.wet, again.kept
         return cls(*(np.zeros((size, columns)) for size in sizes))
 
 
@@ -121,6 +121,7 @@ class StepRates:
             if again.problem.varied_fields.exists:
                 decided.append(again.problem.varied_fields.decided.copy())
             if n == 0:
+                self._lit = self._of.light(again, again.places[0])
                 self._start_strains = self._of.strains(again, again.places[0])
                 if again.wet:
                     rates = step.start.strain_rate[self.constants.raised_rows]
@@ -129,7 +130,7 @@ class StepRates:
             place, correction, followed = again.find(n, self._of.follower.matrices)
             reached.append(place)
             self.residual = max(self.residual, correction / step.length)
-            self._stages.append(self._of.of(again, n, step, followed))
+            self._stages.append(self._of.of(again, n, step, followed, self._lit))
         self.ended, self._end = reached[-1].position, None
         again = self._agains[stages] if step.beyond else self._agains[stages - 1]
         if step.beyond:
@@ -142,10 +143,11 @@ class StepRates:
             if again.problem.varied_fields.exists:
                 decided.append(again.problem.varied_fields.decided.copy())
             self.ended = again.places[stages + 1].position
-            self._end = self._of.beyond(again, stages, step)
-        elif len(again.speeds):
+            self._end = self._of.beyond(again, stages, step, self._lit)
+        elif again.kept:
             again.finish(stages - 1)
         _, *self._remembered = speeds_at_end(again)
+        self._lit_at_end = self._of.light(again, again.last)
         self.step = replace(step, decided=tuple(decided))
         return reached
 
@@ -244,18 +246,20 @@ class StepRates:
         if self._end:
             found = self._beyond(self._end, (first, speed), (place, turn), gained, turned)
             found.reached = self._end.transduction.forward(start, acts)
-            found.kept = self._remember(start.kept, found.strain_rate)
+            found.kept = self._remember(start, found.strain_rate, found.place)
             return found
         kept = (end_speed - origin_speed) / stage.momentum_length
         kept = (kept - method.carry * push) / (1.0 - method.carry)
         kept[self._forgotten] = 0.0
         speeds = end_speed[:size], end_speed[constants.of_strains]
-        return Rates(place, *speeds, reached, kept[:size], kept[size:], self._remember(start.kept, speeds[1]))
+        return Rates(place, *speeds, reached, kept[:size], kept[size:], self._remember(start, speeds[1], place))
 
-    def _remember(self, kept: Array, strain_rate: Array) -> Array:
+    def _remember(self, start: Rates, strain_rate: Array, place: Array) -> Array:
         """Return rates of what is kept for the next step."""
         by_kept, by_rate = self._remembered
-        return by_kept[:, None] * kept + by_rate[:, None] * strain_rate[self.constants.of_gaps]
+        speeds = by_kept[:, None] * start.kept[: len(by_kept)]
+        speeds += by_rate[:, None] * strain_rate[self.constants.of_gaps]
+        return np.concatenate([speeds, (self._lit_at_end @ place - self._lit @ start.place) / self.step.length])
 
     def _beyond(
         self,
@@ -305,9 +309,11 @@ class StepRates:
         places = [np.zeros((size, columns)) for _ in range(count)]
         direct: list[Array] = [np.zeros((size, columns))] * count
         by_kept, by_rate = self._remembered
-        start.kept += by_kept[:, None] * end.kept
-        end = replace(end, strain_rate=end.strain_rate.copy())
-        end.strain_rate[constants.of_gaps] += by_rate[:, None] * end.kept
+        speeds, of_light = end.kept[: len(by_kept)], end.kept[len(by_kept) :] / h
+        start.kept[: len(by_kept)] += by_kept[:, None] * speeds
+        start.place -= self._lit.T @ of_light
+        end = replace(end, strain_rate=end.strain_rate.copy(), place=end.place + self._lit_at_end.T @ of_light)
+        end.strain_rate[constants.of_gaps] += by_rate[:, None] * speeds
         if beyond := self._end:
             beyond.transduction.backward(end.reached, start, acts)
             self._beyond_back(beyond, end, (first, speed, places[-1]), (ends, end_speeds, origins, origin_speeds))

@@ -8,6 +8,7 @@ import numpy as np
 
 from bilayer_core.engine.varied_diffusion import FieldDifferences, differentiate_field
 from bilayer_core.scene.transduction import lagged
+from bilayer_core.simulation.gradients.light_rates import slopes_of_parts
 from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
 
 if TYPE_CHECKING:
@@ -21,15 +22,17 @@ CHANGE = 1e-6
 class TransductionRates:
     """Maps from what modes had reached at the start of a step, and from stimuli, to what they reach at its point n."""
 
-    def __init__(self, again: StepAgain, n: int, step: KeptStep):
+    def __init__(self, again: StepAgain, n: int, step: KeptStep, lit: Array):
         drives, inputs, state = again.problem.drives, again.inputs, step.start
         self._point, self._channel = n, np.repeat(drives.field_channel, np.diff(drives.field_first))
         self._lag = np.zeros((3, len(self._channel), 1))  # by what was reached, by the first stimulus and by the last
         self._by_others: list[tuple[slice, Array]] = []  # of modes of a field, by what all of them had reached
+        light, modes = again.problem.light, len(self._channel)
+        seen = light.seen if light.exists else np.ones((len(drives.field_channel), 2))
         varied, elapsed = again.problem.varied_fields, float(inputs.elapsed[n])
         for f, channel in enumerate(drives.field_channel):
             own = slice(int(drives.field_first[f]), int(drives.field_first[f + 1]))
-            first, last = inputs.first[channel], inputs.stimulus[n, channel]
+            first, last = inputs.first[channel] * seen[f, 0], inputs.stimulus[n, channel] * seen[f, 1]
             if varied.exists and varied.number[f] >= 0:
                 slope = _slope_of_field(again, f, state.transduction, np.array([first, last]), elapsed)
                 self._by_others.append((own, slope[:, :-2]))
@@ -42,11 +45,26 @@ class TransductionRates:
                     unit = [float(j == k) for j in range(3)]
                     self._lag[k, m] = lagged(*unit, lag, lag, elapsed)
 
+        self._by_place, self._by_kept = np.zeros((modes, again.size)), np.zeros((modes, again.kept))
+        if light.exists:
+            field_of = np.repeat(np.arange(len(seen)), np.diff(drives.field_first))
+            element = np.full(len(seen), -1)
+            element[light.field] = np.arange(len(light.field))
+            own = np.flatnonzero(element[field_of] >= 0)
+            k, count = element[field_of[own]], len(light.field)
+            stimuli = inputs.first[self._channel[own]], inputs.stimulus[n, self._channel[own]]
+            slopes = slopes_of_parts(again, n, step)[:, :, k]
+            slope = sum(self._lag[1 + i, own, 0] * stimuli[i] * slopes[i] for i in range(2))
+            self._by_place[own] = slope[0][:, None] * lit[k] + slope[1][:, None] * lit[count + k]
+            first_kept = again.kept - 2 * count
+            self._by_kept[own, first_kept + k], self._by_kept[own, first_kept + count + k] = slope[2:]
+            self._lag[1:, :, 0] *= seen[field_of].T
+
     def forward(self, start: Rates, acts: Inputs) -> Array:
         """Return rates of what is reached."""
-        found = self._lag[0] * start.reached
+        found = self._lag[0] * start.reached + self._by_place @ start.place + self._by_kept @ start.kept
         for own, slope in self._by_others:
-            found[own] = slope @ start.reached[own]
+            found[own] += slope @ start.reached[own]
         if len(self._channel):
             found += self._lag[1] * acts.first[self._channel]
             found += self._lag[2] * acts.stimulus[self._point, self._channel]
@@ -55,6 +73,8 @@ class TransductionRates:
     def backward(self, reached: Array, start: Rates, acts: Inputs) -> None:
         """Add derivatives by what they come from."""
         start.reached += self._lag[0] * reached
+        start.place += self._by_place.T @ reached
+        start.kept += self._by_kept.T @ reached
         for own, slope in self._by_others:
             start.reached[own] += slope.T @ reached[own]
         if len(self._channel):
