@@ -22,6 +22,7 @@ from bilayer_core.observed.frame import Description
 from bilayer_core.simulation.gradients.course import Course
 from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
 from bilayer_core.simulation.gradients.impact_rates import speeds_at_end
+from bilayer_core.simulation.gradients.light_rates import light_rates
 from bilayer_core.simulation.gradients.nearby import (
     PLACES,
     Builders,
@@ -329,7 +330,7 @@ class VariedNumbers:
             np.zeros(here.end_rates.size),
             np.zeros(here.transduction.size),
             np.zeros(here.end_rates.size + here.wet),
-            np.zeros(len(here.speeds)),
+            np.zeros(here.kept),
         )
         if number.agains:
             own = number.rates or [None] * len(number.agains)
@@ -376,7 +377,7 @@ class VariedNumbers:
                 push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
         return [
             *gradients,
-            speeds_at_end(again)[0],
+            np.concatenate([speeds_at_end(again)[0], light_rates(again, step)]),
             again.speeds_of_held,
             again.momenta_of_bodies,
             again.transduction.copy(),
