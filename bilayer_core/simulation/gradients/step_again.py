@@ -87,7 +87,7 @@ class KeptStep:
 
     @property
     def beyond(self) -> bool:
-        """Whether it ends beyond its last stage."""
+        """True if it ends beyond its last stage."""
         points, stages = self.method.couplings.shape
         return points > stages
 

@@ -1,4 +1,4 @@
-"""What numbers of a scene change by themselves in a run: its start, and where each stage of its steps ended.
+"""Changes that numbers of a scene make by themselves in a run: its start, and where each stage of its steps ended.
 
 That is a difference of models, as for equilibria: gains and stimuli act through the laws of materials alone, and need
 none. With a number such as a thickness, layers that were alike become unlike, and their masses are off the curve. Rates
