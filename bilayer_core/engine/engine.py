@@ -7,11 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from bilayer_core.engine import friction_differences, gradient_differences, step_response  # noqa: F401 (declares pieces)
 from bilayer_core.engine.actuation import Actuation
 from bilayer_core.engine.capacity import CapacityError
 from bilayer_core.engine.energy_account import open_account
 from bilayer_core.engine.error_norm import ErrorNorm
 from bilayer_core.engine.integrate import Attempt, Clock, Counts, Failure, Integration, StepControl, integrate
+from bilayer_core.engine.linear import krylov_solution  # noqa: F401 (likewise)
 from bilayer_core.engine.observables import Observables, observe
 from bilayer_core.engine.potential import add_forces, expand_to_unknowns
 from bilayer_core.engine.run_extrema import count_shape

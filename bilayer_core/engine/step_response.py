@@ -82,6 +82,9 @@ class ElasticMaps:
     by_law: Matrix  # of the gradient by eigenstrains, shape (n_law, size)
     law_slope: Vector  # of eigenstrains by what laws follow, with gains
     law_by_gain: Vector
+    by_reached: LackingMatrix  # of what modes reach, by what others had reached
+    by_place: LackingMatrix  # and by places at the start of the step
+    by_kept: LackingMatrix  # and by what was kept
     lag: Matrix  # of what modes reach, by that at the start, by the first stimulus and that of the stage (3, n_mode)
 
 
@@ -219,6 +222,22 @@ def _forgotten(p, method, j, strains):
 
 
 @kernel
+def _add_reached(elastic, start, out):
+    """Add what modes reach by other modes, by places and by what was kept."""
+    multiply(elastic.by_reached, start.reached, False, out)
+    multiply(elastic.by_place, start.place, False, out)
+    multiply(elastic.by_kept, start.kept, False, out)
+
+
+@kernel
+def _add_reached_back(elastic, of, start):
+    """Add the transpose."""
+    multiply(elastic.by_reached, of, True, start.reached)
+    multiply(elastic.by_place, of, True, start.place)
+    multiply(elastic.by_kept, of, True, start.kept)
+
+
+@kernel
 def _wet_place(p, size, j):
     """Return where the fluid's momentum j acts, among unknowns and strains."""
     return j if j < size else j + p.raised.first
@@ -272,6 +291,7 @@ def go_forward(p, at, stage, method, lack, lacks, c, maps, elastic, bodies, star
         k = c.channel[m]
         w.reached[m] = elastic.lag[0, m] * start.reached[m]
         w.reached[m] += elastic.lag[1, m] * acts.first[k] + elastic.lag[2, m] * acts.stimulus[n, k]
+    _add_reached(elastic, start, w.reached)
     for j in range(whole):
         w.guess[j] = origin[j] + length * origin_speed[j]
     _write_masses(c, w.guess, change)
@@ -388,6 +408,7 @@ def end_forward_beyond(p, at, method, c, maps, elastic, bodies, start, end, acts
         k = c.channel[m]
         end.reached[m] = elastic.lag[0, m] * start.reached[m]
         end.reached[m] += elastic.lag[1, m] * acts.first[k] + elastic.lag[2, m] * acts.stimulus[n, k]
+    _add_reached(elastic, start, end.reached)
     return READY
 
 
@@ -440,6 +461,7 @@ def begin_backward_beyond(p, at, method, c, maps, elastic, bodies, end, start, a
         start.reached[m] += elastic.lag[0, m] * end.reached[m]
         acts.first[k] += elastic.lag[1, m] * end.reached[m]
         acts.stimulus[n, k] += elastic.lag[2, m] * end.reached[m]
+    _add_reached_back(elastic, end.reached, start)
     return READY
 
 
@@ -532,6 +554,7 @@ def go_backward(p, at, stage, method, lack, lacks, c, maps, elastic, bodies, end
         start.reached[m] += elastic.lag[0, m] * w.reached[m]
         acts.first[k] += elastic.lag[1, m] * w.reached[m]
         acts.stimulus[n, k] += elastic.lag[2, m] * w.reached[m]
+    _add_reached_back(elastic, w.reached, start)
     multiply(maps.by_strain, moved, True, origin[size:])
     multiply(maps.by_kept, moved, True, start.kept)
     pulled = w.guess

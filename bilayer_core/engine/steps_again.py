@@ -7,6 +7,7 @@ import math
 from bilayer_core.engine.actuation import Actuation, drive_step, take_first_stimuli
 from bilayer_core.engine.configuration import move, take_state
 from bilayer_core.engine.evaluate import evaluate_at
+from bilayer_core.engine.light_over_step import begin_light
 from bilayer_core.engine.linear.krylov_solution import ROUNDED, Lack, solve_with_lack
 from bilayer_core.engine.linear.newton_matrix import factorise, solve
 from bilayer_core.engine.newton import first_guess_of
@@ -60,6 +61,8 @@ def begin_step(p, state, method, actuation, inputs, work, begin, h, same, start)
     start_step_point(p, state, start, work.first)
     work.stage.length, work.stage.momentum_length = method.diagonal * h, method.momentum_diagonal * h
     work.start_angle[:] = 0.0
+    if p.light.exists:
+        begin_light(p, state)
     return READY
 
 

@@ -21,8 +21,12 @@ from __future__ import annotations
 
 import math
 
-from bilayer_core.jit import kernel
+from bilayer_core.jit import kernel, piece, record
+from bilayer_core.jit.record import Matrix, Vector
 from bilayer_core.kinematics.copying import copy
+from bilayer_core.model.records.problem import Problem
+from bilayer_core.model.records.status import READY
+from bilayer_core.model.records.varied_fields import DECISIONS
 
 LEVELS = 3
 SAFETY, LEAST_FACTOR, LARGEST_FACTOR = 0.8, 0.2, 4.0
@@ -62,8 +66,10 @@ def _change(varied, own, size, u, push, q):
 
 
 @kernel
-def _extrapolate(varied, own, size, u, push, h):
-    """Write q after a step of length h [s] to `moved`; return its error, in parts of what is allowed, and its order."""
+def _extrapolate(varied, own, size, u, push, h, asked):
+    """Write q after a step of length h [s] to `moved`, of the order that is asked for, or with 0 of one that is enough;
+    return its error, in parts of what is allowed, and its order.
+    """
     level, q, change, span = varied.level, varied.moved, varied.change, varied.span
     for n in range(LEVELS):
         copy(varied.present, q)
@@ -84,7 +90,7 @@ def _extrapolate(varied, own, size, u, push, h):
             if n > 0:
                 square += (better - level[n - 1, i]) ** 2
         error = math.sqrt(square) / varied.tolerance[own]
-        if n == LEVELS - 1 or (n > 0 and error <= 1.0):
+        if n + 1 == asked or n == LEVELS - 1 or (n > 0 and error <= 1.0 and asked == 0):
             return error, n + 1
     return math.inf, LEVELS
 
@@ -110,13 +116,53 @@ def diffuse(varied, drives, f, reached, first, last, dt, reached_out):
     size, push, time, h = drives.field_first[f + 1] - begin, (last - first) / dt, 0.0, dt
     for i in range(size):
         varied.present[i] = varied.amplitude[own, i] * (reached[begin + i] - first)
+    decided, follows, count = varied.decided, varied.follows[0], 0
     while time < dt:
-        h = min(h, dt - time)
-        error, order = _extrapolate(varied, own, size, first + push * time, push, h)
+        asked = decided[own, count] if follows and count < DECISIONS else 0
+        ends = asked // 2 % 2 == 1 if asked > 0 else not h < dt - time
+        if ends:
+            h = dt - time
+        error, order = _extrapolate(varied, own, size, first + push * time, push, h, asked // 4)
         factor = LARGEST_FACTOR if error == 0.0 else SAFETY * error ** (-1.0 / order)
-        if error <= 1.0 or h <= SHORTEST * dt:
-            time = dt if h == dt - time else time + h
+        taken = asked % 2 == 1 if asked > 0 else error <= 1.0 or h <= SHORTEST * dt
+        if not follows and count < DECISIONS:
+            decided[own, count] = 4 * order + 2 * ends + taken
+        count += 1
+        if taken:
+            time = dt if ends else time + h
             copy(varied.moved, varied.present)
         h *= min(max(factor, LEAST_FACTOR), LARGEST_FACTOR)
     for i in range(size):
         reached_out[begin + i] = last + varied.present[i] / varied.amplitude[own, i]
+
+
+@record
+class FieldDifferences:
+    """How a field at the end of a time depends on its modes at the start, and on the stimulus there and at the end."""
+
+    start: Vector  # of modes of all fields
+    end: Vector
+    stimulus: Vector  # first and last
+    slope: Matrix  # shape (n_mode, n_mode + 2)
+
+
+@piece(int, Problem, FieldDifferences, int, float, float)
+def differentiate_field(p, differences, f, dt, change):
+    """Write how a field depends on what it comes from, by a change of each either way; its steps are decided alike."""
+    varied, start, end, stimulus = p.varied_fields, differences.start, differences.end, differences.stimulus
+    slope, begin, before = differences.slope, p.drives.field_first[f], varied.follows[0]
+    size = slope.shape[0]
+    diffuse(varied, p.drives, f, start, stimulus[0], stimulus[1], dt, end)
+    varied.follows[0] = True
+    for j in range(size + 2):
+        inputs, place = (start, begin + j) if j < size else (stimulus, j - size)
+        own = inputs[place]
+        for side in range(-1, 2, 2):
+            inputs[place] = own + side * change
+            diffuse(varied, p.drives, f, start, stimulus[0], stimulus[1], dt, end)
+            for i in range(size):
+                gained = side * end[begin + i] / (2.0 * change)
+                slope[i, j] = gained if side < 0 else slope[i, j] + gained
+        inputs[place] = own
+    varied.follows[0] = before
+    return READY

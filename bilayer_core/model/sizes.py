@@ -61,6 +61,7 @@ def sizes_of(model: Model) -> dict[str, int]:
         "mode": len(model.drives.mode_rising),
         "field": len(model.drives.field_channel),
         "varied mode": int(np.diff(model.drives.field_first).max(initial=0)) if model.varied_fields.exists else 0,
+        "varied field": len(model.varied_fields.tolerance) if model.varied_fields.exists else 0,
         "level": 3 if model.varied_fields.exists else 0,
         "lit": len(model.light.law),
         "load": len(scene.loads),

@@ -88,6 +88,15 @@ SPUN = HANGING | SPACE | MIDPOINT | {"bodies.wall.motion": SPINNING, LAG: 0.05}
 OFF_CURVE = HANGING | {THICKNESS: 1.5e-4, DENSITY: 2000.0}
 PUSHED_OFF = OFF_CURVE | SPACE | {"loads": [JET], "solver.integrator": "sdirk2"}
 WADES = PUSHED_OFF | {MODULUS: 3e7, "fluid": WATER | {"added_mass": True}}
+SHINES = HANGING | {TIME: 0.02, LAG: 0.03, "stimuli.swelling.light": {"from": [0.3, 0, 1], "shadow": False}}
+ROOF = {"name": "roof", "position": [0.06, 0, 0.05], "motion": {"type": "prescribed"}}
+ROOFED = {"bodies": [WALL, ROOF | {"surface": {"shape": "sphere", "radius": 0.01}}], "contact": ON_A_POST["contact"]}
+SHADED = SHINES | SPACE | ROOFED | {"stimuli.swelling.light": {"from": [0.3, 0.1, 1], "shadow": True}}
+FIELD = {"stimulus": "swelling", "partition": 0.5, "top": {}}
+VARIED = {"passive": 2e-5, "active": {"at": [0, 0.4, 1], "value": [1e-5, 2e-5, 5e-5]}}
+SOAKS = HANGING | {"rods.strip.diffusion": FIELD | {"diffusivity": {"passive": 2e-5, "active": 3e-5}}}
+VARIES = HANGING | {"rods.strip.diffusion": FIELD | {"diffusivity": VARIED}}
+DIFFUSIVITY = "rods.strip.diffusion.diffusivity"
 RESTS = {"start": "settle", "stimuli.swelling.schedule.from": 0.3}
 CASES = {
     "in a plane": ("bending", HANGING, 0.2, [GAIN, LEVEL, TIME, MODULUS, THICKNESS, "gravity.2", LENGTH]),
@@ -99,6 +108,15 @@ CASES = {
     "generalised alpha": ("bending", HANGING | ALPHA | VISCOUS | SPACE, 0.1, [GAIN, MODULUS, THICKNESS]),
     "layers that become unlike": ("bending", HANGING | UNLIKE, 0.1, [MODULUS, DENSITY]),
     "a lag": ("bending", HANGING | {LAG: 0.05}, 0.2, [GAIN, LEVEL, LAG]),
+    "diffusion": (
+        "bending",
+        SOAKS,
+        0.05,
+        [LEVEL, THICKNESS, f"{DIFFUSIVITY}.active", "rods.strip.diffusion.partition"],
+    ),
+    "diffusion that varies": ("bending", VARIES, 0.05, [GAIN, LEVEL, f"{DIFFUSIVITY}.active.value.1"]),
+    "light": ("bending", SHINES, 0.05, [LEVEL, LAG, "gravity.2", LENGTH]),
+    "a shadow": ("bending", SHADED, 0.04, [GAIN, "gravity.2"]),
     "masses off the curve": ("bending", OFF_CURVE, 0.1, [THICKNESS, LENGTH]),
     "masses off the curve that turn": ("bending", PUSHED_OFF, 0.05, [GAIN, THICKNESS, "loads.0.force.2"]),
     "added mass of unlike layers": ("bending", WADES, 0.05, [GAIN, THICKNESS, "loads.0.force.2"]),
@@ -220,6 +238,8 @@ BACK = {
     "in a plane": ("bending", HANGING, 0.1, [GAIN, LEVEL, THICKNESS, LENGTH]),
     "in space": ("bending", HANGING | SPACE | VISCOUS, 0.1, [GAIN, LEVEL, MODULUS, VISCOSITY]),
     "fibres in space": ("chiral_pod", {}, 0.02, ["gravity.2"]),
+    "a shadow": ("bending", SHADED, 0.03, [LEVEL]),
+    "diffusion that varies": ("bending", VARIES, 0.05, [LEVEL, f"{DIFFUSIVITY}.passive"]),
     "generalised alpha": ("bending", HANGING | ALPHA | VISCOUS, 0.1, [GAIN, MODULUS]),
     "contact": ("bending", ON_A_POST, 0.2, [LEVEL, "obstacles.post.radius"]),
     "friction": ("jumping", {}, 0.03, ["gravity.2"]),
@@ -352,7 +372,6 @@ def test_a_run_that_begins_elsewhere_begins_there_whatever_the_numbers_are():
 @pytest.mark.parametrize(
     ("name", "overrides", "to", "told"),
     [
-        ("ring", {}, "gravity.2", "light"),
         ("bending", IN_WATER | HEAVY | MIDPOINT, "fluid.density", "end beyond their last stage"),
         ("bending", {"bodies.wall.motion": SPINNING, "start": "settle"}, GAIN, "settles and then moves"),
         ("bending", {}, "swelling", "a number of its schedule"),

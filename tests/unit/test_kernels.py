@@ -37,6 +37,18 @@ slow = sorted({"numba", "scipy.linalg", "scipy.special", "pint", "rich", "matplo
 print(json.dumps([sorted(needed), sorted(name for name, of in PIECES.items() if of.seconds), slow]))
 """
 
+DECLARED = """
+import json
+from importlib import import_module
+from bilayer_core.jit.compile_all import ENGINE
+from bilayer_core.jit.piece import PIECES
+
+import_module(ENGINE)
+before = set(PIECES)
+import_module("bilayer_core.simulation.gradients.run_response")
+print(json.dumps(sorted(set(PIECES) - before)))
+"""
+
 
 def _printed_by(program, *arguments):
     tests = Path(__file__).parents[1]
@@ -65,3 +77,7 @@ def test_a_run_knows_its_pieces_and_loads_no_library_in_vain(scene):
     assert slow == []
     assert loaded <= needed and len(needed) < 90
     assert not {"factor_5", "begin_light", "add_drag"} & needed
+
+
+def test_pieces_of_derivatives_are_declared_with_the_engine_where_workers_look_for_them():
+    assert _printed_by(DECLARED) == []

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from bilayer_core.jit.record import Indices, Matrix, Vector, record
+from bilayer_core.jit.record import Flags, IndexTable, Indices, Matrix, Vector, record
+
+DECISIONS = 64
+"""Of steps of a field that are kept: order, whether a step was the last and whether it was taken. With them, values
+nearby go the same way, and what they reach has a derivative."""
 
 
 @record
@@ -27,4 +31,6 @@ class VariedFields:
     moved: Vector = ("varied mode",)
     change: Vector = ("varied mode",)  # q′ [1/s times q]
     span: Vector = ("varied mode",)  # (1 − exp(−λ h))/λ [s]
+    decided: IndexTable = ("varied field", DECISIONS)  # of the last steps of each; see `diffuse`
+    follows: Flags = (1,)  # whether these decide once more
     level: Matrix = ("level", "varied mode")

@@ -46,7 +46,7 @@ def slopes_of_gaps(again: StepAgain, at: Configuration) -> Entries:
 
 def by_impacts(again: StepAgain, at: Configuration) -> tuple[Entries, Entries]:
     """Return ∂g by strains at the origin of a stage that ends at a configuration, and by speeds in memory, shapes
-    (size, n_strain), (size, n_pair).
+    (size, n_strain), (size, n_kept).
     """
     restitution, stage, size, memory = again.problem.restitution, again.stage, again.size, again.speeds
     gap, origin = _gaps(again, at).gap, stage.origin_strain
@@ -75,7 +75,7 @@ def by_impacts(again: StepAgain, at: Configuration) -> tuple[Entries, Entries]:
     chosen = np.array(rows, dtype=np.int64)
     nothing = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64), np.zeros(0)
     of_strains = Entries(*nothing, (size, origin.size)).beside(by_origin, restitution.first + chosen)
-    return of_strains, Entries(*nothing, (size, len(memory))).beside(by_memory, chosen)
+    return of_strains, Entries(*nothing, (size, again.kept)).beside(by_memory, chosen)
 
 
 def speeds_at_end(again: StepAgain) -> tuple[Array, Array, Array]:

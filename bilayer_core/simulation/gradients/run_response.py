@@ -111,11 +111,6 @@ class RunResponse:
         reasons = [f"the force {name!r}" for name in others]
         if "added mass" in model.forces and any(len(m.couplings) > m.couplings.shape[1] for m in methods):
             reasons.append("added mass with an integrator whose steps end beyond their last stage")
-        problem = self._stepper.engine.problem
-        if problem.light.exists:
-            reasons.append("light")
-        if problem.varied_fields.exists:
-            reasons.append("diffusion that varies with what it brings")
         if reasons:
             raise InputError(f"gradient: a run is not differentiated through {', '.join(reasons)}")
 
@@ -149,7 +144,7 @@ class RunResponse:
         per = np.array([self._size / number.scale for number in numbers])
         gain = np.stack([number.gain for number in numbers], axis=-1)
         for k, step in enumerate(self._course.steps(self._maker)):
-            reached = rates.take(step)
+            reached, step = rates.take(step), rates.step
             self._note(step)
             direct = [self._varied.in_step(number, step, reached) for number in numbers]
             first = np.stack([number.first[k] for number in numbers], axis=-1)
@@ -215,7 +210,7 @@ class RunResponse:
         first, stimulus, gain = 0.0 * driven.first, 0.0 * driven.stimulus, np.zeros(len(here.laws))
         given, tolerance = np.abs(back.place).max(), self._stepper.steps.newton_tolerance
         for n, step in enumerate(self._course.steps(self._maker, backward=True), 1):
-            reached = rates.take(step)
+            reached, step = rates.take(step), rates.step
             self._note(step)
             end = back
             back, acts, direct = rates.backward(end)
@@ -241,7 +236,7 @@ class RunResponse:
         """Return the rates of strains that only models with some numbers have, at the start of each step."""
         begun: list[tuple[Number, list]] = [(number, []) for number in numbers]
         for step in self._course.steps(self._maker) if begun else ():
-            reached = self._rates.take(step)
+            reached, step = self._rates.take(step), self._rates.step
             for number, rates_at_starts in begun:
                 rates_at_starts.append(number.rates)
                 number.rates = self._varied.in_step(number, step, reached).next_rates
@@ -287,7 +282,7 @@ class RunResponse:
         if number.rates is None:
             state.strain_rate += way * along.strain_rate[:, k]
         speeds = evaluator.speeds_of(state)
-        speeds += way * along.kept[:, k]
+        speeds += way * along.kept[: len(speeds), k]
         state.transduction += way * along.reached[self._varied.modes(model), k]
         gains = model.drives.law_gain.copy()
         try:

@@ -21,9 +21,10 @@ from bilayer_core.model.records.step import Configuration
 from bilayer_core.simulation.gradients.entries import Entries
 from bilayer_core.simulation.gradients.followed import Followed, append
 from bilayer_core.simulation.gradients.impact_rates import by_impacts, slopes_of_gaps
+from bilayer_core.simulation.gradients.light_rates import slopes_of_light
 from bilayer_core.simulation.gradients.mechanism_rates import resistances, slopes_of_motions
 from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
-from bilayer_core.simulation.gradients.transduction_rates import lags
+from bilayer_core.simulation.gradients.transduction_rates import TransductionRates
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -215,7 +216,7 @@ class StageRates:
 
     def __init__(self, constants: Constants, follower: Followed, again: StepAgain, entries: int):
         problem, stages = again.problem, len(again.guesses)
-        strains, laws = constants.strains, len(again.laws)
+        strains, laws, modes = constants.strains, len(again.laws), len(again.transduction)
         bodies, held = len(problem.bodies.mass), len(problem.constrained.node)
         wet = again.wet and (again.wet + 64) * (bodies * 6 + 64)
         self.elastic = ElasticMaps(
@@ -225,6 +226,9 @@ class StageRates:
             by_law=np.zeros((laws, again.size)),
             law_slope=np.zeros(laws),
             law_by_gain=np.zeros(laws),
+            by_reached=_list(modes * modes if problem.varied_fields.exists else 0),
+            by_place=_list(modes * again.size if problem.light.exists else 0),
+            by_kept=_list(2 * modes if problem.light.exists else 0),
             lag=np.zeros((3, len(constants.record.channel))),
         )
         one = {name: np.zeros((bodies, 3, 3)) for name in ("before", "end", "first", "beyond")}
@@ -283,8 +287,10 @@ class StageDerivatives:
         _put(found.elastic.fluid.by_place, by_place)
         _put(found.elastic.fluid.by_speed, by_speed)
 
-    def write(self, again: StepAgain, n: int, step: KeptStep) -> None:
-        """Write the maps of stage n of a step, what its Hessian lacks by forces that follow being written."""
+    def write(self, again: StepAgain, n: int, step: KeptStep, lit: Array) -> None:
+        """Write the maps of stage n of a step; what its Hessian lacks by forces that follow, and how light at its start
+        depends on places, are known.
+        """
         found, stage, at = self.stages[n], again.stage, again.places[n + 1]
         self._write_strains(again, at, found)
         if len(again.laws):
@@ -320,11 +326,31 @@ class StageDerivatives:
             slope = 1.0 - (laws / drives.law_saturation) ** 2
             elastic.law_slope[:] = slope * drives.law_gain
             elastic.law_by_gain[:] = slope * (followed @ again.transduction - drives.law_reference)
-        elastic.lag[:] = lags(again, n, step, self.constants.record.channel)
+        self._write_transduction(again, n, step, lit, elastic)
 
-    def write_beyond(self, again: StepAgain, n: int, step: KeptStep) -> None:
+    def write_beyond(self, again: StepAgain, n: int, step: KeptStep, lit: Array) -> None:
         """Write the maps of the end of a step beyond its last stage, its point n."""
         found, at = self.stages[n], again.places[n + 1]
         again.write_body_maps(n, found.bodies)
         write_last_way(again.problem, again.maps, again.places[n], at)
-        found.elastic.lag[:] = lags(again, n, step, self.constants.record.channel)
+        self._write_transduction(again, n, step, lit, found.elastic)
+
+    @staticmethod
+    def _write_transduction(again: StepAgain, n: int, step: KeptStep, lit: Array, elastic: ElasticMaps) -> None:
+        """Write what modes reach at point n of a step."""
+        found = TransductionRates(again, n, step, lit)
+        elastic.lag[:] = found.lag[:, :, 0]
+        elastic.by_reached.count[0] = 0
+        for own, slope in found.by_others:
+            row, column = np.nonzero(slope)
+            first = own.start
+            append(elastic.by_reached, Entries(first + row, first + column, slope[row, column], slope.shape))
+        for matrix, values in ((elastic.by_place, found.by_place), (elastic.by_kept, found.by_kept)):
+            row, column = np.nonzero(values)
+            _put(matrix, Entries(row, column, values[row, column], values.shape))
+
+    def light(self, again: StepAgain, at: Configuration) -> Array:
+        """Return how what elements see of light depends on places, shape (2 n_lit, size)."""
+        if not again.problem.light.exists:
+            return np.zeros((0, self.constants.size))
+        return slopes_of_light(again, at, self.constants.record.free)

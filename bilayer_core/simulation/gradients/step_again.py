@@ -65,12 +65,15 @@ class KeptStep:
     method : Method
     spread : ndarray
         Contacts that friction spread in its stages; see `Engine.spread`.
+    decided : tuple of ndarray
+        Decisions of varied diffusion at its points, if there is any; see `engine.varied_diffusion`.
     """
 
     start: State
     end: State
     method: Method
     spread: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    decided: tuple[Array, ...] = ()
 
     @property
     def begin(self) -> float:
@@ -84,7 +87,7 @@ class KeptStep:
 
     @property
     def beyond(self) -> bool:
-        """Whether it ends beyond its last stage."""
+        """True if it ends beyond its last stage."""
         points, stages = self.method.couplings.shape
         return points > stages
 
@@ -250,6 +253,11 @@ class StepAgain(Evaluator):
         return self.ended.strain_rate
 
     @property
+    def kept(self) -> int:
+        """How much a step keeps for the next: speeds of approach, and rates of what elements see of light."""
+        return len(self.problem.restitution.rate) + 2 * len(self.problem.light.law)
+
+    @property
     def speeds(self) -> Array:
         """Speeds of approach that are in memory during the step, shape (n_pair,)."""
         return self.speeds_of(self._state)
@@ -298,8 +306,17 @@ class StepAgain(Evaluator):
         """Rates of strains at its origin, likewise."""
         return self.point.strain_rate
 
+    def decide(self, n: int) -> None:
+        """Let fields make the steps that were decided at point n, if they are known."""
+        varied, decided = self.problem.varied_fields, self._step.decided
+        if varied.exists:
+            varied.follows[0] = len(decided) > 0
+            if decided:
+                varied.decided[:] = decided[n]
+
     def start(self, n: int) -> None:
         """Start stage n, up to the first guess."""
+        self.decide(n)
         step, places, origin = self._step, (self.places[n], self.guesses[n]), self.point
         before = origin.vectors.copy(), origin.rotation.copy()
         while True:
@@ -338,6 +355,7 @@ class StepAgain(Evaluator):
     def pass_through(self, n: int, end: Configuration) -> None:
         """Go through stage n, of which only the end counts."""
         step = self._step
+        self.decide(n)
         pass_stage(self.problem, self._arrays, step.method, self._inputs, self._work, n, step.length, self.places[n])
         self.places[n + 1] = end
         self.finish(n)
@@ -352,6 +370,7 @@ class StepAgain(Evaluator):
 
     def go_beyond(self, n: int) -> None:
         """Go from the end of the last stage to that of the step, its point n."""
+        self.decide(n)
         step, places = self._step, (self.places[n], self.places[n + 1])
         status = move_beyond(self.problem, self._arrays, step.method, self._inputs, self._work, n, *places)
         if status != READY:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -46,7 +46,7 @@ class Rates:
     push, strain_push : ndarray
         Rates of velocities, and of rates of strains and of the fluid's momentum, that a history keeps, likewise.
     kept : ndarray
-        Speeds of approach in the memory of impacts, shape (n_kept, n).
+        Speeds of approach in the memory of impacts, and rates of what elements see of light, shape (n_kept, n).
     """
 
     place: Array
@@ -61,7 +61,7 @@ class Rates:
     def zeros(cls, again: StepAgain, columns: int) -> Rates:
         """Return rates of a model without any."""
         strains, modes = again.stage.origin_strain.size, again.transduction.size
-        sizes = again.size, again.size, strains, modes, again.size, strains + again.wet, len(again.speeds)
+        sizes = again.size, again.size, strains, modes, again.size, strains + again.wet, again.kept
         return cls(*(np.zeros((size, columns)) for size in sizes))
 
 
@@ -130,26 +130,33 @@ class StepRates:
 
     def take(self, step: KeptStep) -> list[Reached]:
         """Go to a step; return where its stages ended."""
-        self.step, self._count, reached = step, step.method.couplings.shape[1], []
+        self.step, self._count, reached, decided = step, step.method.couplings.shape[1], [], []
         for n, again in enumerate(self._agains[: self._count]):
             self._begin(again, n)
             again.start(n)
+            if again.problem.varied_fields.exists:
+                decided.append(again.problem.varied_fields.decided.copy())
             if n == 0:
+                self._lit = self._of.light(again, again.places[0])
                 self._of.write_start(again, step)
             place, correction = again.find(n, self._of.follower.write)
             reached.append(place)
             self.residual = max(self.residual, correction / step.length)
-            self._of.write(again, n, step)
+            self._of.write(again, n, step, self._lit)
         self.ended, again = reached[-1].position, self._agains[self._count - 1]
         if step.beyond:
             again = self._agains[self._count]
             self._begin(again, self._count)
             again.go_beyond(self._count)
+            if again.problem.varied_fields.exists:
+                decided.append(again.problem.varied_fields.decided.copy())
             self.ended = again.places[self._count + 1].position
-            self._of.write_beyond(again, self._count, step)
-        elif len(again.speeds):
+            self._of.write_beyond(again, self._count, step, self._lit)
+        elif again.kept:
             again.finish(self._count - 1)
         self._remembered = speeds_at_end(again)[1:] if len(again.speeds) else (np.zeros(0), np.zeros(0))
+        self._lit_at_end = self._of.light(again, again.last) if again.kept else self._lit
+        self.step = replace(step, decided=tuple(decided))
         return reached
 
     def _begin(self, again: StepAgain, n: int) -> None:
@@ -203,7 +210,10 @@ class StepRates:
             for part in fields(Rates):
                 getattr(end, part.name)[:, k] = getattr(self._end, part.name)
         by_kept, by_rate = self._remembered
-        end.kept = by_kept[:, None] * start.kept + by_rate[:, None] * end.strain_rate[self.constants.of_gaps]
+        speeds = by_kept[:, None] * start.kept[: len(by_kept)]
+        speeds += by_rate[:, None] * end.strain_rate[self.constants.of_gaps]
+        of_light = (self._lit_at_end @ end.place - self._lit @ start.place) / self.step.length
+        end.kept = np.concatenate([speeds, of_light])
         return end
 
     def backward(self, end: Rates) -> tuple[Rates, Inputs, list[Array]]:
@@ -215,7 +225,9 @@ class StepRates:
         for part in fields(Rates):
             getattr(self._end, part.name)[:] = getattr(end, part.name)[:, 0]
         by_kept, by_rate = self._remembered
-        self._end.strain_rate[self.constants.of_gaps] += by_rate * self._end.kept
+        speeds, of_light = self._end.kept[: len(by_kept)], self._end.kept[len(by_kept) :] / self.step.length
+        self._end.strain_rate[self.constants.of_gaps] += by_rate * speeds
+        self._end.place[:] += self._lit_at_end.T @ of_light
         if self.step.beyond:
             begin_backward_beyond(*self._beyond(), self._end, self._start, acts, work, self._count)
         else:
@@ -223,7 +235,8 @@ class StepRates:
         for n in reversed(range(self._count)):
             go_backward(*self._stage(n), self._end, self._start, acts, work, n, self.step.length)
         end_backward(again.problem, self.constants.record, first.strains, first.fluid, self._start, work)
-        self._start.kept[:] += by_kept * self._end.kept
+        self._start.kept[: len(by_kept)] += by_kept * speeds
+        self._start.place[:] -= self._lit.T @ of_light
         start = Rates(*(getattr(self._start, part.name)[:, None].copy() for part in fields(Rates)))
         inputs = Inputs(acts.first[:, None], acts.stimulus[: len(method.couplings), :, None], acts.gain[:, None])
         return start, inputs, [of[:, None] for of in acts.direct[: self._count]]

@@ -1,4 +1,4 @@
-"""What numbers of a scene change by themselves in a run: its start, and where each stage of its steps ended.
+"""Changes that numbers of a scene make by themselves in a run: its start, and where each stage of its steps ended.
 
 That is a difference of models, as for equilibria: gains and stimuli act through the laws of materials alone, and need
 none. With a number such as a thickness, layers that were alike become unlike, and their masses are off the curve. Rates
@@ -22,6 +22,7 @@ from bilayer_core.observed.frame import Description
 from bilayer_core.simulation.gradients.course import Course
 from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
 from bilayer_core.simulation.gradients.impact_rates import speeds_at_end
+from bilayer_core.simulation.gradients.light_rates import light_rates
 from bilayer_core.simulation.gradients.nearby import (
     PLACES,
     Builders,
@@ -329,7 +330,7 @@ class VariedNumbers:
             np.zeros(here.end_rates.size),
             np.zeros(here.transduction.size),
             np.zeros(here.end_rates.size + here.wet),
-            np.zeros(len(here.speeds)),
+            np.zeros(here.kept),
         )
         if number.agains:
             own = number.rates or [None] * len(number.agains)
@@ -376,7 +377,7 @@ class VariedNumbers:
                 push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
         return [
             *gradients,
-            speeds_at_end(again)[0],
+            np.concatenate([speeds_at_end(again)[0], light_rates(again, step)]),
             again.speeds_of_held,
             again.momenta_of_bodies,
             again.transduction.copy(),

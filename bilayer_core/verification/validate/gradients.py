@@ -166,6 +166,9 @@ WATER = {"density": 1000.0, "velocity": [0, 0.05, 0], "drag_along": 0.01, "drag_
 UNLIKE_IN_WATER = SWELLING | {"materials.active.youngs_modulus": 3e7, "fluid": WATER}
 STRIDE = {"stimuli.humidity.schedule.period": 0.4}
 GRIP = EULER | {"solver.dt": 0.001, "stimuli.humidity.schedule.start": 0, "stimuli.humidity.schedule.end": 0.05}
+FIELD = {"stimulus": "swelling", "top": {}, "diffusivity": {"active": {"at": [0, 1], "value": [1e-5, 5e-5]}}}
+VARIED = {"rods.strip.diffusion": FIELD}
+LIT = {"stimuli.swelling.light": {"from": [0.3, 0, 1]}, f"{ACTIVE}.eigenstrain.time_constant": 0.03}
 THROWN, BALL = thrown(1e9, 3, restitution=0.5), "body/ball/position"
 RUNS: dict[str, tuple[Any, ...]] = {
     "stimulus": ("bending", SWELLING, 0.2, LEVEL),
@@ -178,6 +181,8 @@ RUNS: dict[str, tuple[Any, ...]] = {
     "hinges/density": ("arch", {}, 0.005, "materials.passive.density"),
     "starts at rest/gain": ("bending", SWELLING | {"start": "settle"}, 0.05, GAIN),
     "impact/restitution": (THROWN, {}, 5e-4, "contact.restitution", BALL),
+    "light/gravity": ("bending", SWELLING | LIT, 0.05, "gravity.2"),
+    "diffusion that varies/stimulus": ("bending", SWELLING | VARIED, 0.05, LEVEL),
     "fibres/gravity": ("chiral_pod", {}, 0.02, "gravity.2"),
     "swimmer/density of the fluid": ("swimming", {}, 0.01, "fluid.density"),
     "added mass/density of the fluid": ("flagellum", {}, 0.05, "fluid.density"),
