@@ -98,7 +98,8 @@ class RunResult:
         Parameters
         ----------
         seeds : mapping of str to ndarray
-            For ``"positions"`` and ``"velocities"`` of nodes, shape (n_node, 3).
+            For ``"positions"`` and ``"velocities"`` of nodes, shape (n_node, 3), and for ``"body_positions"`` and
+            ``"body_velocities"``, shape (n_body, 3), 0 for bodies that are not free.
         to : str or sequence of str
             As in `gradient`.
 

@@ -262,10 +262,16 @@ BACK = {
 def test_what_comes_back_from_the_end_is_what_goes_forward_to_1e_10(case):
     name, overrides, duration, to = BACK[case]
     simulator, result = kept_run(name, overrides, duration)
+    sizes = {"": simulator.model.node_count, "body_": len(simulator.model.bodies.names)}
     seeds = {
-        of: np.random.default_rng(k).normal(size=(simulator.model.node_count, 3))
-        for k, of in enumerate(("positions", "velocities"))
+        of + kind: np.random.default_rng(k).normal(size=(size, 3))
+        for of, size in sizes.items()
+        for k, kind in enumerate(("positions", "velocities"))
     }
+    free = simulator.model.free_bodies.body_of_free
+    for of, seed in seeds.items():
+        if of.startswith("body_"):
+            seed[np.setdiff1d(np.arange(len(seed)), free)] = 0.0
     back = result.pull_back(seeds, to)
     response = result.differentiable.response()
     numbers = [number for of in response.numbers(to).values() for number in of]
@@ -273,6 +279,9 @@ def test_what_comes_back_from_the_end_is_what_goes_forward_to_1e_10(case):
     for k, path in enumerate(to):
         forward = np.vdot(seeds["positions"], along.place[response.nodes, k]) + np.vdot(
             seeds["velocities"], along.speed[response.nodes, k]
+        )
+        forward += np.vdot(seeds["body_positions"][free], along.place[response.bodies, k]) + np.vdot(
+            seeds["body_velocities"][free], along.speed[response.bodies, k]
         )
         assert back[path] == pytest.approx(forward, rel=1e-10), path
 

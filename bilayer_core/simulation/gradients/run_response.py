@@ -54,8 +54,8 @@ DIFFERENTIATED = {
     *FOLLOWING,
 }
 """Forces through which runs are differentiated."""
-SEEDS = ("positions", "velocities")
-"""By which a derivative comes back from the end of a run."""
+SEEDS = {"positions": "place", "velocities": "speed", "body_positions": "place", "body_velocities": "speed"}
+"""By which a derivative comes back from the end of a run, and the part of `Rates` where it does; of nodes, or bodies."""
 AT_END = ("speed", "push", "strain_rate", "reached", "strain_push", "kept")
 """Rates that a number changes by itself at the end of a step."""
 FORGETS = 1e6
@@ -118,6 +118,11 @@ class RunResponse:
     def nodes(self) -> Array:
         """Rows of positions and velocities of nodes in `Rates`, shape (n_node, 3)."""
         return self._here.of_nodes
+
+    @property
+    def bodies(self) -> Array:
+        """Rows of positions and velocities of free bodies there, shape (n_free, 3)."""
+        return self._here.of_bodies[:, :3]
 
     @property
     def known(self) -> Collection[str]:
@@ -193,15 +198,8 @@ class RunResponse:
         """Return the derivative by each number of Σ seed · quantity at the end of the run."""
         rates, here, free = self._rates, self._here, self._rates.constants.moves
         back = Rates.zeros(here, 1)
-        nodes = self.model.node_count
         for name, seed in seeds.items():
-            given = np.asarray(seed, dtype=float)
-            if name not in SEEDS or given.shape != (nodes, 3) or not np.isfinite(given).all():
-                raise InputError(
-                    f"gradient: {name} of shape {given.shape} is not allowed; allowed are "
-                    f"{' and '.join(SEEDS)} of nodes, finite, shape ({nodes}, 3)"
-                )
-            (back.place if name == SEEDS[0] else back.speed)[here.of_nodes, 0] = given
+            self._seed(back, name, np.asarray(seed, dtype=float))
         back.place, back.speed = free * back.place, free * back.speed
         begun = self._rates_at_starts([number for number in numbers if number.rates is not None])
         found, self._left, self._forgets = np.zeros(len(numbers)), 0.0, False
@@ -231,6 +229,20 @@ class RunResponse:
             starts = zip(self._varied.at_start(number), by_start, strict=True)
             found[k] += sum(float(own @ by[:, 0]) for own, by in starts)
         return found.tolist()
+
+    def _seed(self, back: Rates, name: str, given: Array) -> None:
+        """Write what a derivative begins with at the end of a run."""
+        nodes, bodies, free = self.model.node_count, len(self.model.bodies.names), self.model.free_bodies.body_of_free
+        of_bodies = name.startswith("body_")
+        fits = given.shape == (bodies if of_bodies else nodes, 3) and np.isfinite(given).all()
+        if name not in SEEDS or not fits or (of_bodies and np.delete(given, free, axis=0).any()):
+            raise InputError(
+                f"gradient: {name} of shape {given.shape} is not allowed; allowed are positions and velocities of "
+                f"nodes, shape ({nodes}, 3), and body_positions and body_velocities, shape ({bodies}, 3), finite and 0 "
+                "for bodies that are not free"
+            )
+        rows = self.bodies if of_bodies else self.nodes
+        getattr(back, SEEDS[name])[rows, 0] = given[free] if of_bodies else given
 
     def _rates_at_starts(self, numbers: Sequence[Number]) -> list[tuple[Number, list]]:
         """Return the rates of strains that only models with some numbers have, at the start of each step."""

@@ -6,7 +6,6 @@ import warnings
 
 import numpy as np
 
-from bilayer_core.errors import InputError
 from bilayer_core.simulation.run_result import RunResult
 from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.studies.sweeps.job import Job
@@ -24,13 +23,13 @@ def slopes_of(job: Job, simulator: Simulator, ended: RunResult) -> tuple[dict[st
     """
     model, asks = simulator.model, job.metrics[job.slope_of]
     assert isinstance(asks, OfQuantity), "the client has seen to it"
-    if model.free_count and model.robot_mass.any():
-        raise InputError("gradient: the mass centre of a robot with free bodies is not differentiated in searches")
-    mass, seeds = model.rods.node_mass, np.zeros((model.node_count, 3))
-    seeds[:, AXES.index(asks.quantity)] = mass / (mass.sum() + model.robot_mass.sum())
+    parts, seeds = {"positions": model.rods.node_mass, "body_positions": model.robot_mass}, dict[str, np.ndarray]()
+    for name, mass in parts.items():
+        seeds[name] = np.zeros((len(mass), 3))
+        seeds[name][:, AXES.index(asks.quantity)] = mass / sum(map(np.sum, parts.values()))
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        by_path = ended.pull_back({"positions": seeds}, [path for paths in job.paths.values() for path in paths])
+        by_path = ended.pull_back(seeds, [path for paths in job.paths.values() for path in paths])
     grown = [str(of.message) for of in told if "forgets its start" in str(of.message)]
     if grown:
         return {}, grown[0]
