@@ -55,7 +55,7 @@ DIFFERENTIATED = {
 }
 """Forces through which runs are differentiated."""
 SEEDS = {"positions": "place", "velocities": "speed", "body_positions": "place", "body_velocities": "speed"}
-"""By which a derivative comes back from the end of a run, and the part of `Rates` where it does; of nodes, or bodies."""
+"""By which a derivative comes back from the end of a run, and the part of `Rates` where it does."""
 AT_END = ("speed", "push", "strain_rate", "reached", "strain_push", "kept")
 """Rates that a number changes by itself at the end of a step."""
 FORGETS = 1e6
