@@ -99,7 +99,7 @@ class RunResult:
         ----------
         seeds : mapping of str to ndarray
             For ``"positions"`` and ``"velocities"`` of nodes, shape (n_node, 3), and for ``"body_positions"`` and
-            ``"body_velocities"``, shape (n_body, 3), 0 for bodies that are not free.
+            ``"body_velocities"``, shape (n_body, 3), 0 for bodies that are not free; for ``"com"``, shape (3,).
         to : str or sequence of str
             As in `gradient`.
 

@@ -407,7 +407,16 @@ def test_a_run_without_kept_steps_has_no_gradient():
         result.gradient("com", GAIN)
 
 
+def test_what_comes_back_from_the_mass_centre_is_its_gradient_with_masses_off_the_curve():
+    unlike = {DENSITY: 5000.0, f"{ACTIVE}.natural_twist": 20.0, "solver.model": "laminate", "solver.dimension": 3}
+    simulator, result = kept_run("bending", HANGING | unlike | {"solver.newton_tolerance": 1e-10}, 0.05)
+    assert simulator.model.raised.first_moment.any()
+    for axis, way in enumerate(np.eye(3)):
+        back = result.pull_back({"com": way}, GAIN)[GAIN]
+        assert back == pytest.approx(result.gradient("com", GAIN)["com", GAIN][axis], rel=1e-5, abs=1e-9), axis
+
+
 def test_seeds_that_do_not_fit_are_refused():
     result = Simulator("bending").run(1e-2, gradients=True)
-    with pytest.raises(InputError, match="allowed are positions and velocities"):
+    with pytest.raises(InputError, match="allowed are com, shape .3,., positions and velocities"):
         result.pull_back({"positions": np.zeros(3)}, GAIN)

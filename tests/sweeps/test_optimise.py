@@ -186,13 +186,21 @@ def test_the_least_value_is_found_by_going_down(straight):
     assert abs(best["gain"]) > 1.9 and best["level"] > 0.89
 
 
-def test_derivatives_of_a_run_are_those_by_parameters_in_their_units(straight):
+ON_A_FLOATING_HUB = {
+    "scene": "swimming",
+    "parameters": {"gain": {"path": "rods.arm.layers.active.eigenstrain.gain", "from": "0.5 %", "to": "2.5 %"}},
+    "metrics": {"reach": {"quantity": "com.z", "take": "change"}},
+}
+
+
+@pytest.mark.parametrize("changes", [{}, ON_A_FLOATING_HUB], ids=["strip", "robot with a free body"])
+def test_derivatives_of_a_run_are_those_by_parameters_in_their_units(straight, changes):
     straight["set"] = {"duration": 0.3, "solver.tolerance": None, "solver.dt": "2 ms", "solver.newton_tolerance": 1e-9}
-    read = read_sweep(straight, is_search=True)
-    job = replace(read.job, slope_of="reach")
-    values = {"gain": 1.0, "level": 0.7}
+    read = read_sweep(straight | changes, is_search=True)
+    job, h = replace(read.job, slope_of="reach"), 1e-3
+    values = {name: {"gain": 1.0, "level": 0.7}[name] for name in read.spec.parameters}
     (row,) = execute(job, [read.point(0, values)])
-    for name, h in (("gain", 1e-3), ("level", 1e-3)):
+    for name in values:
         points = [read.point(0, values | {name: values[name] + side * h}) for side in (1.0, -1.0)]
         above, below = (found.metrics["reach"] for found in execute(read.job, points))
         assert row.slopes[name] == pytest.approx((above - below) / (2.0 * h), rel=1e-4), name

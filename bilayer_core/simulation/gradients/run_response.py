@@ -231,18 +231,36 @@ class RunResponse:
         return found.tolist()
 
     def _seed(self, back: Rates, name: str, given: Array) -> None:
-        """Write what a derivative begins with at the end of a run."""
+        """Add what a derivative begins with at the end of a run."""
+        if name == "com" and given.shape == (3,) and np.isfinite(given).all():
+            self._seed_center(back, given)
+            return
         nodes, bodies, free = self.model.node_count, len(self.model.bodies.names), self.model.free_bodies.body_of_free
         of_bodies = name.startswith("body_")
         fits = given.shape == (bodies if of_bodies else nodes, 3) and np.isfinite(given).all()
         if name not in SEEDS or not fits or (of_bodies and np.delete(given, free, axis=0).any()):
             raise InputError(
-                f"gradient: {name} of shape {given.shape} is not allowed; allowed are positions and velocities of "
+                f"gradient: {name} of shape {given.shape} is not allowed; allowed are com, shape (3,), positions and velocities of "
                 f"nodes, shape ({nodes}, 3), and body_positions and body_velocities, shape ({bodies}, 3), finite and 0 "
                 "for bodies that are not free"
             )
         rows = self.bodies if of_bodies else self.nodes
-        getattr(back, SEEDS[name])[rows, 0] = given[free] if of_bodies else given
+        getattr(back, SEEDS[name])[rows, 0] += given[free] if of_bodies else given
+
+    def _seed_center(self, back: Rates, given: Array) -> None:
+        """Add a derivative by the mass centre: by nodes, bodies and directors of edges with masses off the curve."""
+        model, end = self.model, self._course.end
+        raised, mass, of_bodies = model.raised, model.rods.node_mass, model.robot_mass
+        given = given / (mass.sum() + of_bodies.sum())
+        back.place[self.nodes, 0] += mass[:, None] * given
+        back.place[self.bodies, 0] += of_bodies[model.free_bodies.body_of_free, None] * given
+        pull, w, i = raised.first_moment.sum(axis=1)[:, None] * given, end.director1[raised.edge], model.rods.edge_node
+        edge = end.position[i[raised.edge] + 1] - end.position[i[raised.edge]]
+        length = np.linalg.norm(edge, axis=1, keepdims=True)
+        along = np.sum(pull * edge, axis=1, keepdims=True) / length**2 * w
+        np.add.at(back.place[:, 0], self.nodes[i[raised.edge]], along)
+        np.add.at(back.place[:, 0], self.nodes[i[raised.edge] + 1], -along)
+        back.place[self._here.of_edges[raised.edge], 0] += np.sum(pull * np.cross(edge / length, w), axis=1)
 
     def _rates_at_starts(self, numbers: Sequence[Number]) -> list[tuple[Number, list]]:
         """Return the rates of strains that only models with some numbers have, at the start of each step."""

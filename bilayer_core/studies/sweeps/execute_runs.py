@@ -136,7 +136,7 @@ def _simulate(job: Job, point: Point, row: Row, begin: float, log: Path | None) 
     if ended.termination is Termination.COMPLETED:
         row.metrics = measure(job, FinishedRun(simulator, summary, job.in_si(point.parameters), recording))
         if job.slope_of:
-            row.slopes, row.reason = slopes_of(job, simulator, ended)
+            row.slopes, row.reason = slopes_of(job, ended)
     else:
         row.outcome = Outcome.OVER_TIME
         row.reason = f"took longer than {job.wall_time:g} s; it was at t = {simulator.time:g} s of the scene"

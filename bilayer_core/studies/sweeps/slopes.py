@@ -7,7 +7,6 @@ import warnings
 import numpy as np
 
 from bilayer_core.simulation.run_result import RunResult
-from bilayer_core.simulation.simulator import Simulator
 from bilayer_core.studies.sweeps.job import Job
 from bilayer_core.studies.sweeps.spec import OfQuantity
 
@@ -15,21 +14,16 @@ AXES = ("com.x", "com.y", "com.z")
 """Quantities whose last values have derivatives."""
 
 
-def slopes_of(job: Job, simulator: Simulator, ended: RunResult) -> tuple[dict[str, float], str]:
+def slopes_of(job: Job, ended: RunResult) -> tuple[dict[str, float], str]:
     """Return the derivatives of the metric that is searched for by the parameters, in their units, and why there are
     none.
-
-    The mass centre is that of nodes; layers off the curve, which turn with it, are left out.
     """
-    model, asks = simulator.model, job.metrics[job.slope_of]
+    asks = job.metrics[job.slope_of]
     assert isinstance(asks, OfQuantity), "the client has seen to it"
-    parts, seeds = {"positions": model.rods.node_mass, "body_positions": model.robot_mass}, dict[str, np.ndarray]()
-    for name, mass in parts.items():
-        seeds[name] = np.zeros((len(mass), 3))
-        seeds[name][:, AXES.index(asks.quantity)] = mass / sum(map(np.sum, parts.values()))
+    along = np.eye(3)[AXES.index(asks.quantity)]
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
-        by_path = ended.pull_back(seeds, [path for paths in job.paths.values() for path in paths])
+        by_path = ended.pull_back({"com": along}, [path for paths in job.paths.values() for path in paths])
     grown = [str(of.message) for of in told if "forgets its start" in str(of.message)]
     if grown:
         return {}, grown[0]
