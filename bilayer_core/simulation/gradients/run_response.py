@@ -240,9 +240,9 @@ class RunResponse:
         fits = given.shape == (bodies if of_bodies else nodes, 3) and np.isfinite(given).all()
         if name not in SEEDS or not fits or (of_bodies and np.delete(given, free, axis=0).any()):
             raise InputError(
-                f"gradient: {name} of shape {given.shape} is not allowed; allowed are com, shape (3,), positions and velocities of "
-                f"nodes, shape ({nodes}, 3), and body_positions and body_velocities, shape ({bodies}, 3), finite and 0 "
-                "for bodies that are not free"
+                f"gradient: {name} of shape {given.shape} is not allowed; allowed are com, shape (3,), positions and "
+                f"velocities of nodes, shape ({nodes}, 3), body_positions and body_velocities, shape ({bodies}, 3), 0 "
+                "for bodies that are not free; finite numbers"
             )
         rows = self.bodies if of_bodies else self.nodes
         getattr(back, SEEDS[name])[rows, 0] += given[free] if of_bodies else given
