@@ -447,15 +447,7 @@ def begin_backward_beyond(p, at, method, c, maps, elastic, bodies, end, start, a
         _along_back(strands, maps.way[1], e, -w.before[e], place)
     gather(p, at, place)
     turn_origin_back(p, bodies, method, n, w.first, w.speed, w.push, w.end, w.origin, place)
-    for j in range(w.first.shape[0]):
-        w.first[j] += place[j]
-        w.speed[j] += speed[j]
-        for i in range(n):
-            coupling = method.couplings[n, i]
-            w.end[i, j] += coupling * place[j]
-            w.origin[i, j] -= coupling * place[j]
-            w.end_speed[i, j] += coupling * speed[j]
-            w.origin_speed[i, j] -= coupling * speed[j]
+    _to_stages_before(method, w, n, place, speed)
     for m in range(c.channel.shape[0]):
         k = c.channel[m]
         start.reached[m] += elastic.lag[0, m] * end.reached[m]
@@ -575,19 +567,25 @@ def go_backward(p, at, stage, method, lack, lacks, c, maps, elastic, bodies, end
         _turns_back(p, c, maps, bodies, length, before, start, w, n)
     predict_back(p, bodies, origin, origin_speed)
     turn_origin_back(p, bodies, method, n, w.first, w.speed, w.push, w.end, w.origin, origin)
-    for j in range(whole):
-        if method.history:
-            w.speed[j] += method.along[n] * h * origin[j]
-            w.push[j] += method.bend * h * h * origin[j] + method.momenta[n] * h * origin_speed[j]
-        w.first[j] += origin[j]
-        w.speed[j] += origin_speed[j]
+    for j in range(whole if method.history else 0):
+        w.speed[j] += method.along[n] * h * origin[j]
+        w.push[j] += method.bend * h * h * origin[j] + method.momenta[n] * h * origin_speed[j]
+    _to_stages_before(method, w, n, origin, origin_speed)
+    return READY
+
+
+@kernel
+def _to_stages_before(method, w, n, place, speed):
+    """Hand derivatives by the origin of stage n, or by the end beyond stages, on to the start and the stages before."""
+    for j in range(w.first.shape[0]):
+        w.first[j] += place[j]
+        w.speed[j] += speed[j]
         for i in range(n):
             coupling = method.couplings[n, i]
-            w.end[i, j] += coupling * origin[j]
-            w.origin[i, j] -= coupling * origin[j]
-            w.end_speed[i, j] += coupling * origin_speed[j]
-            w.origin_speed[i, j] -= coupling * origin_speed[j]
-    return READY
+            w.end[i, j] += coupling * place[j]
+            w.origin[i, j] -= coupling * place[j]
+            w.end_speed[i, j] += coupling * speed[j]
+            w.origin_speed[i, j] -= coupling * speed[j]
 
 
 @kernel

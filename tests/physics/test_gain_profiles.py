@@ -128,7 +128,7 @@ def test_a_pattern_multiplies_a_profile_of_gains():
 
 
 @pytest.mark.parametrize("path", ["rods.strip.layers.active.thickness", f"{GAIN}.value.1", "swelling"])
-def test_an_equilibrium_that_goes_to_other_gains_then_moves_as_one_that_was_built_with_them(path):
+def test_an_equilibrium_at_other_gains_moves_as_one_that_was_built_with_them(path):
     gains, found = {**sloping(5), "value": [0.03, -0.02, 0.01, 0.0, 0.02]}, []
     for begin in (sloping(5), gains):
         here, name = equilibrium_of(at_rest(begin, **{"rods.strip.section": "beam"})), f"{GAIN}.value"

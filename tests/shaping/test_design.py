@@ -182,7 +182,7 @@ def test_a_ribbon_winds_to_a_helix_on_a_cone_whose_turns_do_not_draw_its_end_awa
     assert found.rms < 3e-3 and found.shapes[0].ends_apart < 0.05 * found.size
 
 
-def test_all_arms_of_a_swimmer_get_the_pattern_of_the_first_though_they_carry_the_hub_that_holds_it():
+def test_all_arms_of_a_swimmer_get_the_pattern_of_the_first_on_a_floating_hub():
     path, gains = "rods.arm.layers.active.eigenstrain.gain", [0.01, 0.03, 0.02]
     profile = {"at": [0.0, 0.05, 0.1], "value": gains}
     wanted = curve_of({path: profile}, 1.0, "swimming", "light", "arm_0")

@@ -448,7 +448,8 @@ class _Search:
             simulator = self._in_sections_of_search()
         return self._report(termination + self._out_of_reach(), simulator)
 
-    def _in_sections_of_search(self):
+    def _in_sections_of_search(self) -> Simulator:
+        """Return a simulator of the scene with the sections of the search."""
         return Simulator(self._scene_with(self._values, self._sections))
 
     def _search(self) -> str:
