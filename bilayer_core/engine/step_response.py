@@ -576,7 +576,7 @@ def go_backward(p, at, stage, method, lack, lacks, c, maps, elastic, bodies, end
 
 @kernel
 def _to_stages_before(method, w, n, place, speed):
-    """Hand derivatives by the origin of stage n, or by the end beyond stages, on to the start and the stages before."""
+    """Give derivatives by the origin of stage n, or by the end of the step, to the start and the stages before."""
     for j in range(w.first.shape[0]):
         w.first[j] += place[j]
         w.speed[j] += speed[j]
