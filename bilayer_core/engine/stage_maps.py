@@ -204,14 +204,19 @@ def _write_way(first, second, e, of_first, of_second):
 
 
 @kernel
-def _add_block(strands, e, block, matrix):
-    """Add forces on the vector of an edge, by changes of the vector and by turns, shape (3, 4)."""
-    for r in range(6):
-        for n in range(7):
-            value = block[r % 3, 3 if n == 6 else n % 3]
-            if (r < 3) == (n < 3):
-                value = -value
-            add_entry(matrix, unknown_of_edge(strands, e, r), unknown_of_edge(strands, e, n), value)
+def _add_block(strands, e, u, around, by, turn, matrix):
+    """Add a force on the vector of an edge: [u]× + `around` × `by` by changes of it, turn × `around` by turns."""
+    a, k = strands.node_unknown[strands.edge_node[e]], strands.edge_unknown[e]
+    b = strands.node_unknown[strands.edge_node[e] + 1]
+    for c in range(3):
+        for d in range(3):
+            value = _skew(u, c, d) + around[c] * by[d]
+            add_entry(matrix, a + c, a + d, -value)
+            add_entry(matrix, a + c, b + d, value)
+            add_entry(matrix, b + c, a + d, value)
+            add_entry(matrix, b + c, b + d, -value)
+        add_entry(matrix, a + c, k, turn * around[c])
+        add_entry(matrix, b + c, k, -turn * around[c])
 
 
 @kernel
@@ -247,7 +252,6 @@ def differentiate_turns(p, maps, start, guess, at, stage, seen):
         _write_way(guess, at, e, way[1], way[2])
     if seen:
         _add_turns(strands, maps)
-    of_end, of_origin = stack_matrix(3, 4), stack_matrix(3, 4)
     for e in range(strands.edge_count):
         i, t, length, inertia = strands.edge_node[e], row(at.tangent, e), at.length[e], strands.spin_inertia[e]
         vector = combine(1.0, row(at.position, i + 1), -1.0, row(at.position, i))
@@ -256,17 +260,12 @@ def differentiate_turns(p, maps, start, guess, at, stage, seen):
         factor = inertia / (h * length) ** 2
         size, around = factor * (at.total_angle[e] - stage.origin_angle[e]), cross(t, lengthened)
         ahead = 0.5 * sums.edge[e, 3] / (length * length)  # by forces that see turns since the start of the stage
-        for c in range(3):
-            for d in range(3):
-                crossed = _skew(t, c, d)
-                across = (_skew(lengthened, c, d) - cross(lengthened, t)[c] * t[d]) / length
-                of_end[c, d] = size * (crossed - across) - 2.0 * size * around[c] * t[d] / length + ahead * crossed
-                of_end[c, d] += factor * around[c] * way[2, e, d]
-                of_origin[c, d] = -size * crossed
-            of_end[c, 3] = factor * around[c]
-            of_origin[c, 3] = -factor * around[c]
-        _add_block(strands, e, of_end, maps.lacking)
-        _add_block(strands, e, of_origin, maps.by_origin)
+        u, by = (
+            combine(size + ahead, t, -size / length, lengthened),
+            combine(factor, row(way[2], e), -3.0 * size / length, t),
+        )
+        _add_block(strands, e, u, around, by, factor, maps.lacking)
+        _add_block(strands, e, scaled(-size, t), around, (0.0, 0.0, 0.0), -factor, maps.by_origin)
         spin = inertia / stage.momentum_length + p.damping * inertia
         if fluid.exists:
             spin += fluid.mass[e, 2] / stage.momentum_length

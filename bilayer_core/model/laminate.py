@@ -408,7 +408,7 @@ def _add_eigenstrain(
         else:
             groups = [
                 (
-                    found.law(scene, law, response, of_point=hat is not None),
+                    found.law(scene, law, response),
                     with_copies(rod, edges),
                     _on_cells(response, cells) * part,
                 )

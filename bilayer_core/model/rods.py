@@ -196,7 +196,7 @@ def _add_eigenstrain(
         else:
             groups = [
                 (
-                    np.tile(found.law(scene, law, response, of_point=hat is not None), (len(edges), 1)),
+                    np.tile(found.law(scene, law, response), (len(edges), 1)),
                     weight if response.along is None else weight * response.along[edges],
                 )
                 for response in responses(rod, layer, law)

@@ -53,19 +53,14 @@ class Collected:
             return np.zeros((0,) if width is None else (0, width), dtype)
         return np.concatenate(parts).astype(dtype, order="C", copy=False)
 
-    def law(
-        self, scene: SceneConfig, law: Following, response: Response, alone: bool = False, of_point: bool = False
-    ) -> tuple[int, int]:
-        """Return the numbers of the laws for mean and gradient of a response, the latter −1 without one; equal laws
-        share one, unless it is for one element `alone`, which light reaches differently, or that of a profile's point.
+    def law(self, scene: SceneConfig, law: Following, response: Response, alone: bool = False) -> tuple[int, int]:
+        """Return the numbers of new laws for mean and gradient of a response, the latter −1 without one; laws follow
+        the same field where they may, unless this one is for one element `alone`, which light reaches differently.
         """
         followed = list(scene.stimuli).index(law.stimulus), response.lags, response.varied
         laws = [(response.mean, law.gain, response.mean_reference, law.limit)]
         if response.gradient:
             laws.append((response.gradient, law.gain, response.gradient_reference, law.limit))
-        for number, (at, *others) in enumerate(self.laws if not (alone or of_point) else ()):
-            if self.fields[at] == followed and tuple(others) == laws[0]:
-                return number, number + 1 if response.gradient else -1
         shared = not alone and followed in self.fields
         field = self.fields.index(followed) if shared else len(self.fields)
         if not shared:
@@ -74,14 +69,17 @@ class Collected:
         return len(self.laws) - len(laws), len(self.laws) - 1 if response.gradient else -1
 
     def modulus(self, scene: SceneConfig, rod: Rod, layer: Layer) -> int:
-        """Return the number of the multiple of a layer's elastic moduli, −1 where these stay."""
+        """Return the number of the multiple of a layer's elastic moduli, −1 where these stay; equal ones are one."""
         if layer.stiffness_change is None:
             return -1
         (response,) = responses(rod, layer, layer.stiffness_change)
         law, _ = self.law(scene, layer.stiffness_change, replace(response, gradient=()))
-        if law not in self.moduli:
-            self.moduli.append(law)
-        return self.moduli.index(law)
+        equal = [number for number, other in enumerate(self.moduli) if self.laws[other] == self.laws[law]]
+        if equal:
+            self.laws.pop()
+            return equal[0]
+        self.moduli.append(law)
+        return len(self.moduli) - 1
 
 
 @dataclass(frozen=True)

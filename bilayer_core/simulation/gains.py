@@ -1,7 +1,7 @@
 """Gains of eigenstrains that change while a simulator keeps its arrays.
 
 The gains of laws are an array that kernels read (`Drives.law_gain`), with one law for each point of a profile. Nothing
-else of a model depends on them, as long as no two laws become one, and no more rods may meet.
+else of a model depends on them, as long as no more rods may meet.
 """
 
 from __future__ import annotations

@@ -427,7 +427,7 @@ class Simulator:
         if not (all(re.search(r"\.gain(\.|$)", path) for path in gains) and alike_but_gains(self.model, other)):
             raise InputError(
                 f"set_gains: {paths}: changes more than gains; allowed are numbers for numbers, and profiles with as "
-                "many points as before, each of its own law; else make a new Simulator"
+                "many points as before; else make a new Simulator"
             )
 
         def take(stepper: Stepper) -> None:

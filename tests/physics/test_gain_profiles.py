@@ -74,6 +74,18 @@ def test_gains_that_are_set_act_as_those_of_a_new_simulator(kind):
     assert simulator.scene.rods[0].layers[1].eigenstrain[0].gain.value[-1] == 0.01
 
 
+def test_layers_with_equal_laws_may_be_set_apart_and_together():
+    equal = {"rods.strip.layers.passive.eigenstrain": {"stimulus": "swelling", "gain": 0.01}}
+    passive = "rods.strip.layers.passive.eigenstrain.gain"
+    simulator, before = at_rest(0.01, **equal), at_rest(0.01, **equal).positions
+    simulator.set_gains({passive: 0.0})
+    simulator.solve_static()
+    assert np.abs(simulator.positions - at_rest(0.01, **equal | {passive: 0.0}).positions).max() < 1e-10
+    simulator.set_gains({passive: 0.01})
+    simulator.solve_static()
+    assert np.abs(simulator.positions - before).max() < 1e-10
+
+
 def test_a_run_with_gains_that_were_set_is_that_of_a_new_simulator_bit_for_bit():
     simulator, other = hanging(sloping(5, (0.0, 0.0))), hanging(sloping(5))
     simulator.set_gains({f"{GAIN}.value": sloping(5)["value"]})

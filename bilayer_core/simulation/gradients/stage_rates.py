@@ -1,7 +1,8 @@
 """Linear maps of a stage of a step that was made; `engine.step_response` has what they are for.
 
-∂g/∂η of eigenstrains and ∂σ/∂q of viscous strains are read off the gradient itself, which is linear in η and in the
-strains of the origin: one evaluation for as many of them as no unknown sees together.
+∂g/∂η of eigenstrains and ∂σ/∂q of viscous strains are read off the gradient itself, which is linear in the strains of
+the origin: one evaluation for as many of them as no unknown sees together. In η of strips that curl it is not, which
+takes two evaluations for each law.
 """
 
 from __future__ import annotations
@@ -339,15 +340,16 @@ class StageDerivatives:
     def _write_transduction(again: StepAgain, n: int, step: KeptStep, lit: Array, elastic: ElasticMaps) -> None:
         """Write what modes reach at point n of a step."""
         found = TransductionRates(again, n, step, lit)
-        elastic.lag[:] = found.lag[:, :, 0]
+        elastic.lag[:] = found.lag
         elastic.by_reached.count[0] = 0
         for own, slope in found.by_others:
             row, column = np.nonzero(slope)
             first = own.start
             append(elastic.by_reached, Entries(first + row, first + column, slope[row, column], slope.shape))
-        for matrix, values in ((elastic.by_place, found.by_place), (elastic.by_kept, found.by_kept)):
-            row, column = np.nonzero(values)
-            _put(matrix, Entries(row, column, values[row, column], values.shape))
+        if again.problem.light.exists:
+            for matrix, values in ((elastic.by_place, found.by_place), (elastic.by_kept, found.by_kept)):
+                row, column = np.nonzero(values)
+                _put(matrix, Entries(row, column, values[row, column], values.shape))
 
     def light(self, again: StepAgain, at: Configuration) -> Array:
         """Return how what elements see of light depends on places, shape (2 n_lit, size)."""

@@ -113,6 +113,8 @@ class StepAgain(Evaluator):
 
     Attributes
     ----------
+    first : State
+        That it was made with.
     places : list of Configuration
         The start of the step, then the end of each stage, and of a step that ends beyond its last one.
     guesses : list of Configuration
@@ -136,7 +138,7 @@ class StepAgain(Evaluator):
         tolerance: float,
     ):
         super().__init__(model, stages, history)
-        self._state, self._end = state.copy(), state.copy()
+        self.first, self._state, self._end = state, state.copy(), state.copy()
         self._arrays, self._end_arrays = (
             StateArrays(**{name: getattr(of, name) for name in StateArrays.names}) for of in (self._state, self._end)
         )

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from bilayer_core.engine.varied_diffusion import FieldDifferences, differentiate_field
-from bilayer_core.scene.transduction import lagged
 from bilayer_core.simulation.gradients.light_rates import slopes_of_parts
 from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
 
@@ -19,41 +18,48 @@ class TransductionRates:
 
     def __init__(self, again: StepAgain, n: int, step: KeptStep, lit: Array):
         drives, inputs, state = again.problem.drives, again.inputs, step.start
-        self._channel = np.repeat(drives.field_channel, np.diff(drives.field_first))
-        self.lag = np.zeros((3, len(self._channel), 1))  # by what was reached, by the first stimulus and by the last
+        counts, elapsed = np.diff(drives.field_first), float(inputs.elapsed[n])
+        field_of, light, varied = (
+            np.repeat(np.arange(len(counts)), counts),
+            again.problem.light,
+            again.problem.varied_fields,
+        )
+        channel = drives.field_channel[field_of]
+        seen = light.seen if light.exists else np.ones((len(counts), 2))
+        stimuli = np.stack([inputs.first[channel], inputs.stimulus[n, channel]])
+        first, last = stimuli * seen[field_of].T
+        lag = np.where(last > state.transduction, drives.mode_rising, drives.mode_falling)  # on either side of it
+        self.lag = _slopes_of_lag(lag, elapsed)  # by what was reached, by the first stimulus and by the last
         self.by_others: list[tuple[slice, Array]] = []  # of modes of a field, by what all of them had reached
-        light, modes = again.problem.light, len(self._channel)
-        seen = light.seen if light.exists else np.ones((len(drives.field_channel), 2))
-        varied, elapsed = again.problem.varied_fields, float(inputs.elapsed[n])
-        for f, channel in enumerate(drives.field_channel):
+        for f in np.flatnonzero(varied.number >= 0) if varied.exists else ():
             own = slice(int(drives.field_first[f]), int(drives.field_first[f + 1]))
-            first, last = inputs.first[channel] * seen[f, 0], inputs.stimulus[n, channel] * seen[f, 1]
-            if varied.exists and varied.number[f] >= 0:
-                slope = _slope_of_field(again, f, state.transduction, np.array([first, last]), elapsed)
-                self.by_others.append((own, slope[:, :-2]))
-                self.lag[1:, own, 0] = slope[:, -2:].T
-                continue
-            for m in range(own.start, own.stop):
-                rises = last > state.transduction[m]
-                lag = float((drives.mode_rising if rises else drives.mode_falling)[m])  # on either side of it
-                for k in range(3):
-                    unit = [float(j == k) for j in range(3)]
-                    self.lag[k, m] = lagged(*unit, lag, lag, elapsed)
-
-        self.by_place, self.by_kept = np.zeros((modes, again.size)), np.zeros((modes, again.kept))
+            slope = _slope_of_field(
+                again, f, state.transduction, np.array([first[own.start], last[own.start]]), elapsed
+            )
+            self.by_others.append((own, slope[:, :-2]))
+            self.lag[0, own], self.lag[1:, own] = 0.0, slope[:, -2:].T
         if light.exists:
-            field_of = np.repeat(np.arange(len(seen)), np.diff(drives.field_first))
+            modes = len(channel)
+            self.by_place, self.by_kept = np.zeros((modes, again.size)), np.zeros((modes, again.kept))
             element = np.full(len(seen), -1)
             element[light.field] = np.arange(len(light.field))
             own = np.flatnonzero(element[field_of] >= 0)
             k, count = element[field_of[own]], len(light.field)
-            stimuli = inputs.first[self._channel[own]], inputs.stimulus[n, self._channel[own]]
             slopes = slopes_of_parts(again, n, step)[:, :, k]
-            slope = sum(self.lag[1 + i, own, 0] * stimuli[i] * slopes[i] for i in range(2))
+            slope = sum(self.lag[1 + i, own] * stimuli[i, own] * slopes[i] for i in range(2))
             self.by_place[own] = slope[0][:, None] * lit[k] + slope[1][:, None] * lit[count + k]
             first_kept = again.kept - 2 * count
             self.by_kept[own, first_kept + k], self.by_kept[own, first_kept + count + k] = slope[2:]
-            self.lag[1:, :, 0] *= seen[field_of].T
+            self.lag[1:] *= seen[field_of].T
+
+
+def _slopes_of_lag(lag: Array, elapsed: float) -> Array:
+    """Return by what a lag was, by the first and by the last stimulus, what it is (`scene.transduction.lagged`)."""
+    x = elapsed / np.where(lag > 0.0, lag, 1.0)
+    part = -np.expm1(-x)
+    by_last = np.where(lag > 0.0, 1.0 - part / x, 1.0)
+    by_reached = np.where(lag > 0.0, 1.0 - part, 0.0)
+    return np.stack([by_reached, 1.0 - by_reached - by_last, by_last])
 
 
 def _slope_of_field(again: StepAgain, f: int, state: Array, stimulus: Array, elapsed: float) -> Array:

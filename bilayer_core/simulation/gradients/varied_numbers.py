@@ -390,7 +390,7 @@ class VariedNumbers:
         where they are then, and with them the nodes that bodies hold.
         """
         model = again.model
-        fitted = self._builders.state_of(model)
+        fitted = again.first.copy()
         for name in PARTS:
             mine, part = getattr(fitted, name), getattr(state, name)
             if mine.shape == part.shape:
