@@ -7,6 +7,7 @@ import math
 from bilayer_core.engine.actuation import Actuation, drive_step, take_first_stimuli
 from bilayer_core.engine.configuration import move, take_state
 from bilayer_core.engine.evaluate import evaluate_at
+from bilayer_core.engine.laws import lagged
 from bilayer_core.engine.light_over_step import begin_light
 from bilayer_core.engine.linear.krylov_solution import ROUNDED, Lack, solve_with_lack
 from bilayer_core.engine.linear.newton_matrix import factorise, solve
@@ -19,6 +20,7 @@ from bilayer_core.engine.potential import (
 )
 from bilayer_core.engine.stages import add_history_to_origin, predict_stage, set_origin, start_step_point
 from bilayer_core.engine.step import drive_stage
+from bilayer_core.engine.step_response import ElasticMaps
 from bilayer_core.forces.elements import start_elements
 from bilayer_core.forces.rod_contact import find_rod_contacts
 from bilayer_core.jit import kernel, piece, record
@@ -82,6 +84,22 @@ def drive_steps(actuation, method, inputs, driven, first, last, ahead, same):
             for n in range(method.couplings.shape[0]):
                 driven.stimulus[k, n, c] = inputs.stimulus[n, c]
     return last
+
+
+@piece(int, Problem, StateArrays, StageInputs, ElasticMaps, int)
+def write_lags(p, state, inputs, elastic, n):
+    """Write by what modes that lag reach at point n of a step what they had reached, and both stimuli."""
+    drives, lag, elapsed = p.drives, elastic.lag, inputs.elapsed[n]
+    for f in range(drives.field_channel.shape[0]):
+        last = inputs.stimulus[n, drives.field_channel[f]]
+        if p.light.exists:
+            last *= p.light.seen[f, 1]
+        for m in range(drives.field_first[f], drives.field_first[f + 1]):
+            slower = drives.mode_rising[m] if last > state.transduction[m] else drives.mode_falling[m]
+            lag[0, m] = lagged(1.0, 0.0, 0.0, slower, slower, elapsed)
+            lag[1, m] = lagged(0.0, 1.0, 0.0, slower, slower, elapsed)
+            lag[2, m] = lagged(0.0, 0.0, 1.0, slower, slower, elapsed)
+    return READY
 
 
 @piece(int, Problem, StateArrays, Method, StageInputs, Work, int, float, Configuration)

@@ -25,7 +25,7 @@ from bilayer_core.simulation.gradients.impact_rates import by_impacts, slopes_of
 from bilayer_core.simulation.gradients.light_rates import slopes_of_light
 from bilayer_core.simulation.gradients.mechanism_rates import resistances, slopes_of_motions
 from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
-from bilayer_core.simulation.gradients.transduction_rates import TransductionRates
+from bilayer_core.simulation.gradients.transduction_rates import write_reached
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -327,29 +327,14 @@ class StageDerivatives:
             slope = 1.0 - (laws / drives.law_saturation) ** 2
             elastic.law_slope[:] = slope * drives.law_gain
             elastic.law_by_gain[:] = slope * (followed @ again.transduction - drives.law_reference)
-        self._write_transduction(again, n, step, lit, elastic)
+        write_reached(again, n, step, lit, elastic)
 
     def write_beyond(self, again: StepAgain, n: int, step: KeptStep, lit: Array) -> None:
         """Write the maps of the end of a step beyond its last stage, its point n."""
         found, at = self.stages[n], again.places[n + 1]
         again.write_body_maps(n, found.bodies)
         write_last_way(again.problem, again.maps, again.places[n], at)
-        self._write_transduction(again, n, step, lit, found.elastic)
-
-    @staticmethod
-    def _write_transduction(again: StepAgain, n: int, step: KeptStep, lit: Array, elastic: ElasticMaps) -> None:
-        """Write what modes reach at point n of a step."""
-        found = TransductionRates(again, n, step, lit)
-        elastic.lag[:] = found.lag
-        elastic.by_reached.count[0] = 0
-        for own, slope in found.by_others:
-            row, column = np.nonzero(slope)
-            first = own.start
-            append(elastic.by_reached, Entries(first + row, first + column, slope[row, column], slope.shape))
-        if again.problem.light.exists:
-            for matrix, values in ((elastic.by_place, found.by_place), (elastic.by_kept, found.by_kept)):
-                row, column = np.nonzero(values)
-                _put(matrix, Entries(row, column, values[row, column], values.shape))
+        write_reached(again, n, step, lit, found.elastic)
 
     def light(self, again: StepAgain, at: Configuration) -> Array:
         """Return how what elements see of light depends on places, shape (2 n_lit, size)."""

@@ -20,6 +20,7 @@ from bilayer_core.engine.linear.lacking_matrix import LackingMatrix
 from bilayer_core.engine.stage_maps import StageMaps
 from bilayer_core.engine.step import move_beyond
 from bilayer_core.engine.step_ends import end_stage
+from bilayer_core.engine.step_response import ElasticMaps
 from bilayer_core.engine.steps_again import (
     Reached,
     begin_stage,
@@ -30,6 +31,7 @@ from bilayer_core.engine.steps_again import (
     follow,
     go_to,
     pass_stage,
+    write_lags,
 )
 from bilayer_core.errors import SimulationError
 from bilayer_core.model.force_slots import NAMES
@@ -432,6 +434,10 @@ class StepAgain(Evaluator):
         """Write the maps of free bodies in stage n."""
         step = self._step
         write_body_maps(self.problem, self._arrays, step.method, self._work, n, step.length, self.places[n + 1], maps)
+
+    def write_lags(self, n: int, elastic: ElasticMaps) -> None:
+        """Write by what modes reach at point n what they had reached, and stimuli there and at the start."""
+        write_lags(self.problem, self._arrays, self._inputs, elastic, n)
 
     def differentiate_by_laws(self, at: Configuration, differences: StrainDifferences, change: float) -> None:
         """Write how the gradient at a configuration depends on the eigenstrain of each law; see `StrainDifferences`."""
