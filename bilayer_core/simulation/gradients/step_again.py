@@ -352,10 +352,6 @@ class StepAgain(Evaluator):
         else:
             self.update_lagged(at)
 
-    @property
-    def _no_bodies(self) -> Array:
-        return np.zeros_like(self.problem.system.body_step)
-
     def pass_through(self, n: int, end: Configuration) -> None:
         """Go through stage n, of which only the end counts."""
         step = self._step
