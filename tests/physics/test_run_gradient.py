@@ -81,6 +81,7 @@ TWIST = {"name": "twist", "body": "tip", "moment": [0.0005, 0.002, 0.001], "fram
 LIT = {"stimuli.sun.light": None, "stimuli.sun.schedule.start": 0, "stimuli.sun.schedule.end": 0.05}
 SWELLS = LIT | {"rods.ring.layers.outer.eigenstrain": {"stimulus": "sun", "gain": 0.01}}
 RING = SWELLS | SPACE | {"gravity": [1.0, 0.5, -9.81]}
+WET_RING = RING | MIDPOINT | {"materials.silicone.retardation_time": 0, "fluid": WATER | {"added_mass": True}}
 DRIES = {"materials.tissue.retardation_time": 0.01, "rods.valve.layers.outer.interval": [0, 0.06]}
 OF_TIP = {"drag": {"coefficient": 0.5, "area": 1e-3}}
 DRAGGED = {"bodies": [WALL, AT_TIP["bodies"][1] | OF_TIP], "fluid": WATER | {"added_mass": True}}
@@ -147,6 +148,15 @@ CASES = {
     "a moment": ("bending", AT_TIP | {"loads": [TWIST]}, 0.03, [GAIN, "loads.0.moment.1"]),
     "a body that rebounds": ("bending", LANDS, 0.012, ["contact.restitution", "gravity.2"]),
     "a body in water": ("bending", AT_TIP | DRAGGED, 0.02, [GAIN, "fluid.density"]),
+    "added mass by the implicit midpoint rule": (
+        "bending",
+        HANGING | IN_WATER | HEAVY | MIDPOINT,
+        0.03,
+        [GAIN, "fluid.density", LENGTH],
+    ),
+    "a body in water by that rule": ("bending", AT_TIP | DRAGGED | MIDPOINT, 0.02, [GAIN, "fluid.density"]),
+    "added mass of unlike layers by that rule": ("bending", WADES | MIDPOINT, 0.03, [GAIN, "loads.0.force.2"]),
+    "a ring in water by that rule": ("ring", WET_RING, 0.003, ["fluid.density"]),
     "a viscous strip on a body": ("bending", AT_TIP | VISCOUS, 0.03, [GAIN, LENGTH, VISCOSITY]),
     "a viscous strip of fibres": ("chiral_pod", DRIES, 0.02, ["gravity.2", "materials.tissue.retardation_time"]),
     "a ring": ("ring", RING, 0.005, ["gravity.0", "materials.silicone.youngs_modulus"]),
@@ -251,6 +261,9 @@ BACK = {
     "a body with a history": ("bending", HANGING | TURNING | {"solver.integrator": "tr_bdf2"}, 0.01, [GAIN]),
     "the implicit midpoint rule": ("bending", SPUN, 0.02, [GAIN, LEVEL, LENGTH]),
     "a body in water": ("bending", AT_TIP | DRAGGED, 0.01, ["fluid.density"]),
+    "a body in water by the implicit midpoint rule": ("bending", AT_TIP | DRAGGED | MIDPOINT, 0.01, [GAIN]),
+    "unlike layers in water by that rule": ("bending", WADES | MIDPOINT, 0.01, [GAIN, "fluid.density"]),
+    "a ring in water by that rule": ("ring", WET_RING, 0.003, ["gravity.0"]),
     "a viscous strip of fibres": ("chiral_pod", DRIES, 0.01, ["gravity.2"]),
     "added mass": ("flagellum", {}, 0.05, ["fluid.density"]),
     "added mass of unlike layers": ("bending", WADES | ALPHA, 0.05, [GAIN, "fluid.density"]),
@@ -381,7 +394,7 @@ def test_a_run_that_begins_elsewhere_begins_there_whatever_the_numbers_are():
 @pytest.mark.parametrize(
     ("name", "overrides", "to", "told"),
     [
-        ("bending", IN_WATER | HEAVY | MIDPOINT, "fluid.density", "end beyond their last stage"),
+        ("bending", IN_WATER | HEAVY | MIDPOINT, THICKNESS, "makes layers unlike"),
         ("bending", {"bodies.wall.motion": SPINNING, "start": "settle"}, GAIN, "settles and then moves"),
         ("bending", {}, "swelling", "a number of its schedule"),
         ("bending", {}, "contact.stiffness", "contact"),

@@ -106,13 +106,9 @@ class RunResponse:
 
     def _refuse(self) -> None:
         """Refuse what is not differentiated, by its name."""
-        model, methods = self.model, self._stepper.engine.methods
-        others = [name for name in model.forces if name not in DIFFERENTIATED]
-        reasons = [f"the force {name!r}" for name in others]
-        if "added mass" in model.forces and any(len(m.couplings) > m.couplings.shape[1] for m in methods):
-            reasons.append("added mass with an integrator whose steps end beyond their last stage")
-        if reasons:
-            raise InputError(f"gradient: a run is not differentiated through {', '.join(reasons)}")
+        others = [f"the force {name!r}" for name in self.model.forces if name not in DIFFERENTIATED]
+        if others:
+            raise InputError(f"gradient: a run is not differentiated through {', '.join(others)}")
 
     @property
     def nodes(self) -> Array:

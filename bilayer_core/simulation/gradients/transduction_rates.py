@@ -51,7 +51,7 @@ class TransductionRates:
             slopes = slopes_of_parts(again, n, step)[:, :, k]
             slope = sum(self.lag[1 + i, own, 0] * stimuli[i] * slopes[i] for i in range(2))
             self.by_place[own] = slope[0][:, None] * lit[k] + slope[1][:, None] * lit[count + k]
-            first_kept = again.kept - 2 * count
+            first_kept = len(again.speeds)
             self.by_kept[own, first_kept + k], self.by_kept[own, first_kept + count + k] = slope[2:]
             self.lag[1:, :, 0] *= seen[field_of].T
 

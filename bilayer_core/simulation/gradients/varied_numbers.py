@@ -140,6 +140,7 @@ class VariedNumbers:
         self.step = NEAR if "barrier" in self.model.forces or "rod barrier" in self.model.forces else STEP
         self.stages = max(len(method.couplings) for method in methods)
         self._history = len(methods) > 1 or bool(methods[0].history)
+        self._beyond = any(len(method.couplings) > method.couplings.shape[1] for method in methods)
         self.size = max(rod.path.length for rod in self.scene.rods)
         self.here = self.again(self.model)
         self.from_start = self._begins_at_start()
@@ -162,6 +163,7 @@ class VariedNumbers:
             stepper.same_time,
             self.stages,
             self._history,
+            self._beyond,
             SETTLED_WITHIN * stepper.steps.newton_tolerance,
         )
 
@@ -215,6 +217,11 @@ class VariedNumbers:
             if found.agains[0].end_rates.size != self.here.end_rates.size or not np.array_equal(*raised):
                 states = [self._builders.state_of(again.model) for again in found.agains]
                 wet = np.zeros(found.agains[0].wet)
+                if self.here.excess:
+                    raise InputError(
+                        f"gradient: {path} makes layers unlike, and implicit_midpoint then steps added mass in another "
+                        "way; choose another integrator"
+                    )
                 found.rates = [(of.strain_rate, np.concatenate([of.strain_acceleration, wet])) for of in states]
         for again in found.agains:
             refuse_other_plane(self.model, again.model, path, moves=False)
@@ -338,9 +345,10 @@ class VariedNumbers:
                 self._replayed(again, replace(step, start=self.fitted(again, step.start, rates)), reached)
                 for again, rates in zip(number.agains, own, strict=True)
             ]
-            *found.gradient, found.kept, held, momenta, reached_by, rates, push = (
+            *found.gradient, found.kept, released, held, momenta, reached_by, rates, push = (
                 slope(values, h) for values in zip(*seen, strict=True)
             )
+            found.speed[here.of_nodes] = released
             for rows, (speed, gained) in ((here.held, held), (here.of_bodies[:, 3:], momenta)):
                 found.speed[rows] = speed
                 if self._history:
@@ -375,9 +383,11 @@ class VariedNumbers:
             of_fluid = (of_fluid - carry * again.wetted(step.start.fluid_force)) / (1.0 - carry)
             if not step.method.history:
                 push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
+        released, excess = again.release()
         return [
             *gradients,
-            np.concatenate([speeds_at_end(again)[0], light_rates(again, step)]),
+            np.concatenate([speeds_at_end(again)[0], light_rates(again, step), excess]),
+            released,
             again.speeds_of_held,
             again.momenta_of_bodies,
             again.transduction.copy(),
