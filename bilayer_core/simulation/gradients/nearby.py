@@ -141,7 +141,7 @@ class Nearby:
     ):
         self._stepper, self._evaluator, self._stimulus, self._gains = stepper, evaluator, stimulus, gains
         self._near = description
-        self.state, self._light = state, light_of(stepper.model)
+        self.state, self.model, self._light = state, stepper.model, light_of(stepper.model)
         self._load_factor = stepper.surroundings.load_factor(state)
         self._reach(state)
 

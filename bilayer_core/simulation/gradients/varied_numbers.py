@@ -17,7 +17,8 @@ from bilayer_core.engine.steps_again import Driven, Reached, drive_steps
 from bilayer_core.errors import InputError
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.parts import Drives
-from bilayer_core.model.state import PARTS, State
+from bilayer_core.model.start_motion import set_in_motion
+from bilayer_core.model.state import PARTS, State, turn_directors
 from bilayer_core.observed.frame import Description
 from bilayer_core.simulation.gradients.course import Course
 from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
@@ -171,9 +172,6 @@ class VariedNumbers:
         """Return whether the run began at the start of its scene, which depends on the scene's numbers."""
         own, start = self._builders.state_of(self.model), self._course.start
         if self.scene.start == SETTLE and start.time[0] == 0.0:
-            moving = start.velocity, start.spin, start.body_velocity, start.body_angular_velocity
-            if any(part.any() for part in moving):
-                raise InputError("gradient: a run is not differentiated through a start that settles and then moves")
             return True
         parts = ("time", "position", "velocity", "director1", "spin", "transduction", "body_position", "body_rotation")
         return all(np.array_equal(getattr(own, part), getattr(start, part)) for part in parts)
@@ -215,14 +213,14 @@ class VariedNumbers:
             found.agains, found.own = [self.again(self._builders.model_of(scene)) for scene in scenes], True
             raised = [of.problem.raised.edge for of in (found.agains[0], self.here)]
             if found.agains[0].end_rates.size != self.here.end_rates.size or not np.array_equal(*raised):
-                states = [self._builders.state_of(again.model) for again in found.agains]
-                wet = np.zeros(found.agains[0].wet)
+                rates = self._first_rates(found)
+                more = np.zeros(found.agains[0].end_rates.size * self._history + found.agains[0].wet)
                 if self.here.excess:
                     raise InputError(
                         f"gradient: {path} makes layers unlike, and implicit_midpoint then steps added mass in another "
                         "way; choose another integrator"
                     )
-                found.rates = [(of.strain_rate, np.concatenate([of.strain_acceleration, wet])) for of in states]
+                found.rates = [(of, more) for of in rates]
         for again in found.agains:
             refuse_other_plane(self.model, again.model, path, moves=False)
         if any(
@@ -278,8 +276,9 @@ class VariedNumbers:
             if holder >= 0:
                 motion = place[here.of_bodies[holder]]
                 place[here.of_nodes[node]] = motion[:3] + np.cross(motion[3:], arm)
-        momenta = [self.momenta(of, state) for of, state in zip(number.agains, states, strict=False)]
-        if momenta and len(free):
+        if len(free):
+            agains = number.agains or [here] * len(states)
+            momenta = [self.momenta(of, state) for of, state in zip(agains, states, strict=True)]
             speed[here.of_bodies[:, 3:]] = slope(momenta, h)
         rates = rate("strain_rate") if number.rates is None else np.zeros(here.end_rates.size)
         alike = len(states[0].transduction) == len(own.transduction)
@@ -294,12 +293,24 @@ class VariedNumbers:
         place[here.of_nodes[held.node[held.free < 0]]] = 0.0
         return place, speed, rates, reached
 
+    def _first_rates(self, number: Number) -> list[Array]:
+        """Return the rates of strains of other models at the start of their runs."""
+        if not self.from_start or self.scene.start != SETTLE:
+            return [self._builders.state_of(again.model).strain_rate for again in number.agains]
+        h, states = self._settled(number)
+        rates = [state.strain_rate for state in states]
+        return [np.mean(rates, axis=0) + place * self.step * number.scale * slope(rates, h) for place in PLACES]
+
     def _settled(self, number: Number) -> tuple[float, list[State]]:
-        """Return a step of a number, and the equilibria from which runs begin with it at `PLACES`."""
+        """Return a step of a number, and the states from which runs begin with it at `PLACES`."""
         rest = Equilibrium(self._stepper, self._course.start, self._builders, self._description)
         response = rest.respond(rest.parameters([number.path])[number.path][0])
-        motions = [response.motion * (place * response.h) for place in PLACES]
-        return response.h, [near.moved(motion) for near, motion in zip(response.nearby, motions, strict=True)]
+        states = []
+        for near, place in zip(response.nearby, PLACES, strict=True):
+            states.append(near.moved(response.motion * (place * response.h)))
+            set_in_motion(near.model, states[-1])
+            turn_directors(near.model, states[-1])
+        return response.h, states
 
     def _arms(self, state: State) -> Array:
         """Return the arms of nodes that bodies hold, shape (n_held, 3)."""
