@@ -86,6 +86,7 @@ DRIES = {"materials.tissue.retardation_time": 0.01, "rods.valve.layers.outer.int
 OF_TIP = {"drag": {"coefficient": 0.5, "area": 1e-3}}
 DRAGGED = {"bodies": [WALL, AT_TIP["bodies"][1] | OF_TIP], "fluid": WATER | {"added_mass": True}}
 SPUN = HANGING | SPACE | MIDPOINT | {"bodies.wall.motion": SPINNING, LAG: 0.05}
+SPUN_FAST = HANGING | SPACE | {"bodies.wall.motion": SPINNING | {"angular_velocity": [50.0, 5.0, -4.0]}}
 OFF_CURVE = HANGING | {THICKNESS: 1.5e-4, DENSITY: 2000.0}
 PUSHED_OFF = OFF_CURVE | SPACE | {"loads": [JET], "solver.integrator": "sdirk2"}
 WADES = PUSHED_OFF | {MODULUS: 3e7, "fluid": WATER | {"added_mass": True}}
@@ -147,6 +148,7 @@ CASES = {
         0.03,
         [GAIN, LENGTH, "bodies.wall.motion.inertia.1"],
     ),
+    "layers that become unlike on a body that spins": ("bending", SPUN_FAST, 0.01, [MODULUS, DENSITY]),
     "the implicit midpoint rule": ("bending", SPUN, 0.03, [GAIN, LAG, LENGTH, "bodies.wall.motion.inertia.1"]),
     "a moment": ("bending", AT_TIP | {"loads": [TWIST]}, 0.03, [GAIN, "loads.0.moment.1"]),
     "a body that rebounds": ("bending", LANDS, 0.012, ["contact.restitution", "gravity.2"]),
@@ -271,6 +273,7 @@ BACK = {
     "a body that turns": ("bending", HANGING | TURNING, 0.05, [GAIN, "gravity.2"]),
     "a body with a history": ("bending", HANGING | TURNING | {"solver.integrator": "tr_bdf2"}, 0.01, [GAIN]),
     "the implicit midpoint rule": ("bending", SPUN, 0.02, [GAIN, LEVEL, LENGTH]),
+    "layers that become unlike": ("bending", SPUN_FAST, 0.01, [MODULUS]),
     "a body in water": ("bending", AT_TIP | DRAGGED, 0.01, ["fluid.density"]),
     "a body in water by the implicit midpoint rule": ("bending", AT_TIP | DRAGGED | MIDPOINT, 0.01, [GAIN]),
     "unlike layers in water by that rule": ("bending", WADES | MIDPOINT, 0.01, [GAIN, "fluid.density"]),

@@ -27,9 +27,11 @@ from bilayer_core.simulation.gradients.light_rates import light_rates
 from bilayer_core.simulation.gradients.nearby import (
     PLACES,
     Builders,
+    carried,
     carry_directors,
     refuse_other_plane,
     slope,
+    tangents_of,
 )
 from bilayer_core.simulation.gradients.parameters import STEP, laws_of, numbers_of, scene_with
 from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
@@ -53,6 +55,7 @@ class Direct:
     """
 
     gradient: list[Array]
+    place: Array
     speed: Array
     push: Array
     strain_rate: Array
@@ -345,6 +348,7 @@ class VariedNumbers:
             [],
             np.zeros(here.size),
             np.zeros(here.size),
+            np.zeros(here.size),
             np.zeros(here.end_rates.size),
             np.zeros(here.transduction.size),
             np.zeros(here.end_rates.size + here.wet),
@@ -356,10 +360,12 @@ class VariedNumbers:
                 self._replayed(again, replace(step, start=self.fitted(again, step.start, rates)), reached)
                 for again, rates in zip(number.agains, own, strict=True)
             ]
-            *found.gradient, found.kept, released, held, momenta, reached_by, rates, push = (
+            *found.gradient, turned, found.kept, released, held, momenta, reached_by, rates, push = (
                 slope(values, h) for values in zip(*seen, strict=True)
             )
             found.speed[here.of_nodes] = released
+            if not self.model.plane.exists:
+                found.place[here.of_edges] = turned
             for rows, (speed, gained) in ((here.held, held), (here.of_bodies[:, 3:], momenta)):
                 found.speed[rows] = speed
                 if self._history:
@@ -395,8 +401,11 @@ class VariedNumbers:
             if not step.method.history:
                 push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
         released, excess = again.release()
+        tangent, director = again.last.tangent[: len(again.of_edges)], again.last.director1[: len(again.of_edges)]
+        before = carried(tangents_of(self.model.rods.edge_node, step.end.position), tangent, step.end.director1)
         return [
             *gradients,
+            np.einsum("ki,ki->k", np.cross(before, director), tangent),  # turns: nodes that bodies hold turn edges
             np.concatenate([speeds_at_end(again)[0], light_rates(again, step), excess]),
             released,
             again.speeds_of_held,
