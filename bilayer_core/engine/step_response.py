@@ -98,7 +98,7 @@ class StateRates:
     reached: Vector  # what modes have reached of stimuli
     push: Vector  # rates of velocities that a history keeps
     strain_push: Vector  # of rates of strains, and of the fluid's momentum
-    kept: Vector  # speeds of approach in the memory of impacts
+    kept: Vector  # speeds of approach, rates of what elements see of light, `State.fluid_excess` in places of `wet`
 
 
 @record
@@ -243,9 +243,9 @@ def _wet_place(p, size, j):
     return j if j < size else j + p.raised.first
 
 
-@piece(int, Problem, Method, StepConstants, StrainMap, FluidMap, StateRates, StepWork)
-def begin_forward(p, method, c, strains, fluid, start, w):
-    """Take the motion of the start of a step."""
+@piece(int, Problem, Method, StepConstants, StrainMap, FluidMap, StateRates, StepWork, bool)
+def begin_forward(p, method, c, strains, fluid, start, w, excess):
+    """Take the motion of the start of a step; `excess` tells whether the fluid's momentum has its own in `kept`."""
     size, count, whole = start.place.shape[0], start.strain_rate.shape[0], w.first.shape[0]
     w.first[:] = 0.0
     w.speed[:] = 0.0
@@ -263,6 +263,8 @@ def begin_forward(p, method, c, strains, fluid, start, w):
         wet = w.speed[size + count :]
         multiply(fluid.by_place, start.place, False, wet)
         multiply(fluid.by_speed, w.speed, False, wet)
+        for j in range(wet.shape[0] if excess else 0):
+            wet[j] += start.kept[start.kept.shape[0] - wet.shape[0] + j]
     return READY
 
 
@@ -385,7 +387,9 @@ def end_forward(p, stage, method, end, w, n):
 @piece(int, Problem, Configuration, Method, StepConstants, StageMaps, ElasticMaps, BodyMaps, StateRates, StateRates,
        InputRates, StepWork, int)  # fmt: skip
 def end_forward_beyond(p, at, method, c, maps, elastic, bodies, start, end, acts, w, n):
-    """Write the motion of the end of a step beyond its last stage, its point n, at a configuration."""
+    """Write the motion of the end of a step beyond its last stage, its point n, at a configuration, and in place of
+    what the fluid has in `kept` its momentum.
+    """
     strands, size, strains = p.strands, end.place.shape[0], end.strain_rate.shape[0]
     place, speed, last = w.change, w.mass, n - 1
     for j in range(w.first.shape[0]):
@@ -403,6 +407,8 @@ def end_forward_beyond(p, at, method, c, maps, elastic, bodies, start, end, acts
         end.place[j], end.speed[j], end.push[j] = place[j], speed[j], 0.0
     for j in range(strains):
         end.strain_rate[j] = speed[size + j]
+    for j in range(w.first.shape[0] - size - strains):
+        end.kept[end.kept.shape[0] + size + strains - w.first.shape[0] + j] = speed[size + strains + j]
     end.strain_push[:] = 0.0
     for m in range(c.channel.shape[0]):
         k = c.channel[m]
@@ -437,6 +443,8 @@ def begin_backward_beyond(p, at, method, c, maps, elastic, bodies, end, start, a
         place[j], speed[j] = end.place[j], end.speed[j]
     for j in range(strains):
         speed[size + j] = end.strain_rate[j]
+    for j in range(w.first.shape[0] - size - strains):
+        speed[size + strains + j] = end.kept[end.kept.shape[0] + size + strains - w.first.shape[0] + j]
     for e in range(strands.edge_unknown.shape[0] if p.space.exists else 0):
         k = strands.edge_unknown[e]
         w.before[e] = place[k]
@@ -612,8 +620,8 @@ def _turns_back(p, c, maps, bodies, length, before, start, w, n):
             start.place[k] -= before[e]
 
 
-@piece(int, Problem, StepConstants, StrainMap, FluidMap, StateRates, StepWork)
-def end_backward(p, c, strains, fluid, start, w):
+@piece(int, Problem, StepConstants, StrainMap, FluidMap, StateRates, StepWork, bool)
+def end_backward(p, c, strains, fluid, start, w, excess):
     """Write the derivatives by the start of a step."""
     size, count, whole = start.place.shape[0], start.strain_rate.shape[0], w.first.shape[0]
     for e in range(p.strands.edge_unknown.shape[0]):
@@ -625,6 +633,8 @@ def end_backward(p, c, strains, fluid, start, w):
         wet = w.speed[size + count :]
         multiply(fluid.by_place, wet, True, start.place)
         multiply(fluid.by_speed, wet, True, w.speed)
+        for j in range(wet.shape[0] if excess else 0):
+            start.kept[start.kept.shape[0] - wet.shape[0] + j] += wet[j]
     for j in range(size):
         start.speed[j], start.push[j] = c.moves[j] * w.speed[j], w.push[j]
     for j in range(whole - size):

@@ -17,6 +17,9 @@ MODULUS, LENGTH, THICKNESS = (
     "rods.strip.path.length",
     "rods.strip.layers.0.thickness",
 )
+SLIDES = {
+    "bodies.wall.motion": {"type": "guided", "axis": [0, 0, 1], "mass": 1e-3, "sliding": {"spring": 10.0}, "speed": 0.2}
+}
 OF = ["com", "energy/bending", "body/wall/clamp_wrench"]
 
 
@@ -71,6 +74,7 @@ CASES = {
         ["swelling", LENGTH],
     ),
     "two rods in space": ("helix", {"gravity": [0, 0, -0.2]}, {}, ["gravity.2", "rods.strip.layers.1.thickness"]),
+    "a robot that starts in motion": ("bending", HANGING | SLIDES, SWOLLEN, [MODULUS, LENGTH]),
     "arms that hang from a body": ("gripping", {}, {"humidity": 0.8}, ["humidity", "materials.film.density"]),
 }
 

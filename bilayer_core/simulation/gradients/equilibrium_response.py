@@ -260,6 +260,8 @@ class Equilibrium:
             mine[:] = getattr(here, part) + (mine - getattr(start, part))
         for part in HELD:
             getattr(state, part)[:] = getattr(here, part)
+        for part in RATES:
+            getattr(state, part).fill(0.0)
         if not same:
             state.body_rotation[:] = turned @ here.body_rotation
         carry_directors(model, here.position, state)

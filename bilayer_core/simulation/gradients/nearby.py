@@ -79,8 +79,13 @@ def carry_directors(model: Model, before: Array, state: State) -> None:
     if np.array_equal(before, state.position):
         return
     first, second = (tangents_of(model.rods.edge_node, position) for position in (before, state.position))
-    leaning = np.einsum("ki,ki->k", second, state.director1) / (1.0 + np.einsum("ki,ki->k", first, second))
-    state.director1 -= leaning[:, None] * (first + second)
+    state.director1[:] = carried(first, second, state.director1)
+
+
+def carried(first: Array, second: Array, director: Array) -> Array:
+    """Return directors, carried along with tangents from the first to the second, all of shape (n_edge, 3)."""
+    leaning = np.einsum("ki,ki->k", second, director) / (1.0 + np.einsum("ki,ki->k", first, second))
+    return director - leaning[:, None] * (first + second)
 
 
 def values_of(stepper: Stepper, state: State, wanted: Sequence[str], description: Description) -> list[Array]:
@@ -141,7 +146,7 @@ class Nearby:
     ):
         self._stepper, self._evaluator, self._stimulus, self._gains = stepper, evaluator, stimulus, gains
         self._near = description
-        self.state, self._light = state, light_of(stepper.model)
+        self.state, self.model, self._light = state, stepper.model, light_of(stepper.model)
         self._load_factor = stepper.surroundings.load_factor(state)
         self._reach(state)
 

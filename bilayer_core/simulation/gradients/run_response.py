@@ -56,7 +56,7 @@ DIFFERENTIATED = {
 """Forces through which runs are differentiated."""
 SEEDS = {"positions": "place", "velocities": "speed", "body_positions": "place", "body_velocities": "speed"}
 """By which a derivative comes back from the end of a run, and the part of `Rates` where it does."""
-AT_END = ("speed", "push", "strain_rate", "reached", "strain_push", "kept")
+AT_END = ("place", "speed", "push", "strain_rate", "reached", "strain_push", "kept")
 """Rates that a number changes by itself at the end of a step."""
 FORGETS = 1e6
 """Lengths of the rod by which a derivative by a number, times its size, moves it."""
@@ -106,13 +106,9 @@ class RunResponse:
 
     def _refuse(self) -> None:
         """Refuse what is not differentiated, by its name."""
-        model, methods = self.model, self._stepper.engine.methods
-        others = [name for name in model.forces if name not in DIFFERENTIATED]
-        reasons = [f"the force {name!r}" for name in others]
-        if "added mass" in model.forces and any(len(m.couplings) > m.couplings.shape[1] for m in methods):
-            reasons.append("added mass with an integrator whose steps end beyond their last stage")
-        if reasons:
-            raise InputError(f"gradient: a run is not differentiated through {', '.join(reasons)}")
+        others = [f"the force {name!r}" for name in self.model.forces if name not in DIFFERENTIATED]
+        if others:
+            raise InputError(f"gradient: a run is not differentiated through {', '.join(others)}")
 
     @property
     def nodes(self) -> Array:
@@ -174,7 +170,8 @@ class RunResponse:
         if left > most >= self._left:
             warnings.warn(
                 f"gradient: the step from {step.begin:.6g} s, made again, ends {left:.2g} m beside where it ended in "
-                "the run: derivatives may be wrong; choose a smaller newton_tolerance",
+                "the run: derivatives may be wrong; choose a smaller newton_tolerance, or shorter steps where rods "
+                "spin fast about themselves",
                 RuntimeWarning,
                 stacklevel=5,
             )

@@ -16,6 +16,7 @@ from bilayer_core.engine.body_maps import BodyMaps
 from bilayer_core.engine.gradient_differences import StrainDifferences
 from bilayer_core.engine.linear.lacking_matrix import LackingMatrix
 from bilayer_core.engine.stage_maps import differentiate_turns, write_last_way
+from bilayer_core.engine.step_ends import HELD
 from bilayer_core.engine.step_response import ElasticMaps, FluidMap, StepConstants, StrainMap, write_directors
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.step import Configuration
@@ -328,6 +329,28 @@ class StageDerivatives:
             elastic.law_slope[:] = slope * drives.law_gain
             elastic.law_by_gain[:] = slope * (followed @ again.transduction - drives.law_reference)
         write_reached(again, n, step, lit, elastic)
+
+    def release(self, again: StepAgain) -> tuple[Entries, Entries, Entries, Array]:
+        """Return how the fluid's momentum at the end of a step beyond its last stage depends on places and on
+        velocities, and for the rest of it, the velocities that it adds, shape (size, wet), and 1 where it is kept.
+
+        m w + P(q, v + w) is the momentum that the step has, P(q, v) affine in v: its derivative is that at v + w.
+        """
+        gained, _ = again.release()
+        fluid, constants = again.problem.fluid, self.constants
+        freed, kept = fluid.inertia[:, 0, 0] != HELD, np.ones(again.wet)
+        inverse = np.linalg.inv(np.where(freed[:, None, None], fluid.inertia, np.eye(3))) * freed[:, None, None]
+        kept[constants.nodes[freed]] = 0.0
+        joined = fluid.joined[freed[fluid.joined].all(axis=1)]
+        own = np.arange(len(freed))
+        node, other = np.concatenate([np.stack([own, own], axis=1), joined, joined[:, ::-1]]).T
+        row, column = np.repeat(constants.nodes[node], 3, axis=1), np.tile(constants.nodes[other], 3)
+        shape = constants.size, again.wet
+        released = Entries(row.ravel(), column.ravel(), inverse[node].ravel(), shape)
+        ended = again.ended
+        rates = ended.strain_rate[constants.raised_rows]
+        by_place, by_speed = self.follower.momentum(again, again.last, ended.velocity + gained, rates)
+        return by_place, by_speed, released, kept
 
     def write_beyond(self, again: StepAgain, n: int, step: KeptStep, lit: Array) -> None:
         """Write the maps of the end of a step beyond its last stage, its point n."""

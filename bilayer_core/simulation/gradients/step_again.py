@@ -19,7 +19,7 @@ from bilayer_core.engine.linear.krylov_solution import Lack
 from bilayer_core.engine.linear.lacking_matrix import LackingMatrix
 from bilayer_core.engine.stage_maps import StageMaps
 from bilayer_core.engine.step import move_beyond
-from bilayer_core.engine.step_ends import end_stage
+from bilayer_core.engine.step_ends import HELD, end_stage, write_end
 from bilayer_core.engine.step_response import ElasticMaps
 from bilayer_core.engine.steps_again import (
     Reached,
@@ -110,6 +110,8 @@ class StepAgain(Evaluator):
         Of a step, at most, its end counted where that is beyond the last one.
     history : bool
         Whether the integrator keeps stage derivatives.
+    beyond : bool
+        Whether steps may end beyond their last stage.
     tolerance : float
         Of Newton's method [m/s].
 
@@ -125,8 +127,8 @@ class StepAgain(Evaluator):
         Where the stage ended that was found last.
     ended, last : Point, Configuration
         The end of the last stage, or of the step where that is beyond it.
-    size, wet : int
-        Of unknowns, and of the fluid's momentum: in their places, then of kept directors.
+    size, wet, excess : int
+        Of unknowns, and of the fluid's momentum: in their places, then of kept directors; of its part that is kept.
     """
 
     def __init__(
@@ -137,6 +139,7 @@ class StepAgain(Evaluator):
         same: float,
         stages: int,
         history: bool,
+        beyond: bool,
         tolerance: float,
     ):
         super().__init__(model, stages, history)
@@ -170,6 +173,7 @@ class StepAgain(Evaluator):
         self.of_bodies = self._rods + np.arange(6 * bodies).reshape(bodies, 6)
         fluid = self.problem.fluid
         self.wet = self.size + 3 * (len(fluid.momentum) - model.node_count) if fluid.exists else 0
+        self.excess = self.wet if beyond else 0
         self._room = 0
         self.lacks = False
         self.grow_maps(256)
@@ -258,8 +262,10 @@ class StepAgain(Evaluator):
 
     @property
     def kept(self) -> int:
-        """How much a step keeps for the next: speeds of approach, and rates of what elements see of light."""
-        return len(self.problem.restitution.rate) + 2 * len(self.problem.light.law)
+        """How much a step keeps for the next: speeds of approach, rates of what elements see of light, and the fluid's
+        momentum beyond that of velocities.
+        """
+        return len(self.problem.restitution.rate) + 2 * len(self.problem.light.law) + self.excess
 
     @property
     def speeds(self) -> Array:
@@ -376,6 +382,17 @@ class StepAgain(Evaluator):
         if status != READY:
             raise SimulationError("gradient: a step that was made is not possible once more", step.begin)
         self.ended, self.last = self.point, places[1]
+
+    def release(self) -> tuple[Array, Array]:
+        """Return the velocities that the fluid's momentum adds at the end of a step, shape (n_node, 3), 0 of nodes
+        that keep theirs, and the momentum that is kept, shape (excess,); see `engine.step_ends`.
+        """
+        if not self.excess or not self._step.beyond:
+            return np.zeros_like(self.ended.velocity), np.zeros(self.excess)
+        n = len(self._step.method.couplings) - 1
+        write_end(self.problem, self._end_arrays, self.ended, self.last, self._inputs, n)
+        freed = self.problem.fluid.inertia[:, 0, 0] != HELD
+        return freed[:, None] * (self._end.velocity - self.ended.velocity), self.wetted(self._end.fluid_excess)
 
     def gradient(self, n: int) -> Array:
         """Return the gradient of the potential where stage n ended, shape (size,)."""

@@ -46,7 +46,8 @@ class Rates:
     push, strain_push : ndarray
         Rates of velocities, and of rates of strains and of the fluid's momentum, that a history keeps, likewise.
     kept : ndarray
-        Speeds of approach in the memory of impacts, and rates of what elements see of light, shape (n_kept, n).
+        Speeds of approach in the memory of impacts, rates of what elements see of light, and the fluid's momentum
+        beyond that of velocities, shape (n_kept, n).
     """
 
     place: Array
@@ -152,6 +153,8 @@ class StepRates:
                 decided.append(again.problem.varied_fields.decided.copy())
             self.ended = again.places[self._count + 1].position
             self._of.write_beyond(again, self._count, step, self._lit)
+            if again.excess:
+                self._released = self._of.release(again)
         elif again.kept:
             again.finish(self._count - 1)
         self._remembered = speeds_at_end(again)[1:] if len(again.speeds) else (np.zeros(0), np.zeros(0))
@@ -190,7 +193,8 @@ class StepRates:
         """
         columns, own, work, last = start.place.shape[1], self._acts, self._work, self._count - 1
         again, method, first = self._agains[last], self.step.method, self._of.start.elastic
-        points, end = len(method.couplings), Rates.zeros(again, columns)
+        points, end, freed = len(method.couplings), Rates.zeros(again, columns), again.kept - again.excess
+        self._end.kept[:] = 0.0
         own.direct[:] = 0.0
         for k in range(columns):
             for part in fields(Rates):
@@ -200,7 +204,8 @@ class StepRates:
             for n, of in enumerate(direct or ()):
                 own.direct[n] = of[:, k]
             constants = self.constants.record
-            begin_forward(again.problem, method, constants, first.strains, first.fluid, self._start, work)
+            fluid = first.fluid, self._start, work, again.excess > 0
+            begin_forward(again.problem, method, constants, first.strains, *fluid)
             for n in range(self._count):
                 go_forward(*self._stage(n), self._start, own, work, n, self.step.length)
             if self.step.beyond:
@@ -213,7 +218,12 @@ class StepRates:
         speeds = by_kept[:, None] * start.kept[: len(by_kept)]
         speeds += by_rate[:, None] * end.strain_rate[self.constants.of_gaps]
         of_light = (self._lit_at_end @ end.place - self._lit @ start.place) / self.step.length
-        end.kept = np.concatenate([speeds, of_light])
+        end.kept[:freed] = np.concatenate([speeds, of_light])
+        if again.excess and self.step.beyond:
+            by_place, by_speed, released, kept = self._released
+            rest = end.kept[freed:] - by_place @ end.place - by_speed @ np.concatenate([end.speed, end.strain_rate])
+            end.speed += released @ rest
+            end.kept[freed:] = kept[:, None] * rest
         return end
 
     def backward(self, end: Rates) -> tuple[Rates, Inputs, list[Array]]:
@@ -225,7 +235,16 @@ class StepRates:
         for part in fields(Rates):
             getattr(self._end, part.name)[:] = getattr(end, part.name)[:, 0]
         by_kept, by_rate = self._remembered
-        speeds, of_light = self._end.kept[: len(by_kept)], self._end.kept[len(by_kept) :] / self.step.length
+        freed = again.kept - again.excess
+        speeds, of_light = self._end.kept[: len(by_kept)], self._end.kept[len(by_kept) : freed] / self.step.length
+        if again.excess and self.step.beyond:
+            by_place, by_speed, released, kept = self._released
+            rest = kept * self._end.kept[freed:] + (released.T @ self._end.speed[:, None])[:, 0]
+            self._end.kept[freed:] = rest
+            self._end.place[:] -= (by_place.T @ rest[:, None])[:, 0]
+            by_rest = (by_speed.T @ rest[:, None])[:, 0]
+            self._end.speed[:] -= by_rest[: len(self._end.speed)]
+            self._end.strain_rate[:] -= by_rest[len(self._end.speed) :]
         self._end.strain_rate[self.constants.of_gaps] += by_rate * speeds
         self._end.place[:] += self._lit_at_end.T @ of_light
         if self.step.beyond:
@@ -234,7 +253,8 @@ class StepRates:
             begin_backward(again.problem, again.stage, method, self._end, self._start, acts, work, last)
         for n in reversed(range(self._count)):
             go_backward(*self._stage(n), self._end, self._start, acts, work, n, self.step.length)
-        end_backward(again.problem, self.constants.record, first.strains, first.fluid, self._start, work)
+        fluid = first.fluid, self._start, work, again.excess > 0
+        end_backward(again.problem, self.constants.record, first.strains, *fluid)
         self._start.kept[: len(by_kept)] += by_kept * speeds
         self._start.place[:] -= self._lit.T @ of_light
         start = Rates(*(getattr(self._start, part.name)[:, None].copy() for part in fields(Rates)))

@@ -46,7 +46,7 @@ def write_reached(again: StepAgain, n: int, step: KeptStep, lit: Array, elastic:
         row, column = np.nonzero(by_place)
         elastic.by_place.count[0] = elastic.by_kept.count[0] = 0
         append(elastic.by_place, Entries(own[row], column, by_place[row, column], by_place.shape))
-        first_kept = again.kept - 2 * count
+        first_kept = len(again.speeds)
         for by, first in zip(slope[2:], (first_kept, first_kept + count), strict=True):
             append(elastic.by_kept, Entries(own, first + k, by, (len(field_of), again.kept)))
         elastic.lag[1:] *= seen[field_of].T

@@ -19,6 +19,7 @@ from bilayer_core.simulation.gradients.course import Course
 from bilayer_core.simulation.gradients.nearby import Builders, described, values_of
 from bilayer_core.simulation.gradients.run_response import RunResponse
 from bilayer_core.simulation.gradients.varied_numbers import Number
+from bilayer_core.simulation.settling import SETTLE, settle
 
 Array = np.ndarray
 PART = 1e-2
@@ -107,8 +108,10 @@ def _run_with(
             return None
         state.take(course.start)
     before = values_of(builders.stepper_of(run.model), course.end, wanted, description)
-    stepper.evaluate(state)
     try:
+        if run.from_start and run.scene.start == SETTLE:
+            settle(stepper, state, None)
+        stepper.evaluate(state)
         course.repeat(stepper, state)
         after = values_of(stepper, state, wanted, described(description, stepper))
     except SimulationError:

@@ -17,7 +17,8 @@ from bilayer_core.engine.steps_again import Driven, Reached, drive_steps
 from bilayer_core.errors import InputError
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.parts import Drives
-from bilayer_core.model.state import PARTS, State
+from bilayer_core.model.start_motion import set_in_motion
+from bilayer_core.model.state import PARTS, State, turn_directors
 from bilayer_core.observed.frame import Description
 from bilayer_core.simulation.gradients.course import Course
 from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
@@ -26,9 +27,11 @@ from bilayer_core.simulation.gradients.light_rates import light_rates
 from bilayer_core.simulation.gradients.nearby import (
     PLACES,
     Builders,
+    carried,
     carry_directors,
     refuse_other_plane,
     slope,
+    tangents_of,
 )
 from bilayer_core.simulation.gradients.parameters import STEP, laws_of, numbers_of, scene_with
 from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
@@ -52,6 +55,7 @@ class Direct:
     """
 
     gradient: list[Array]
+    place: Array
     speed: Array
     push: Array
     strain_rate: Array
@@ -140,6 +144,7 @@ class VariedNumbers:
         self.step = NEAR if "barrier" in self.model.forces or "rod barrier" in self.model.forces else STEP
         self.stages = max(len(method.couplings) for method in methods)
         self._history = len(methods) > 1 or bool(methods[0].history)
+        self._beyond = any(len(method.couplings) > method.couplings.shape[1] for method in methods)
         self.size = max(rod.path.length for rod in self.scene.rods)
         self.here = self.again(self.model)
         self.from_start = self._begins_at_start()
@@ -162,6 +167,7 @@ class VariedNumbers:
             stepper.same_time,
             self.stages,
             self._history,
+            self._beyond,
             SETTLED_WITHIN * stepper.steps.newton_tolerance,
         )
 
@@ -169,9 +175,6 @@ class VariedNumbers:
         """Return whether the run began at the start of its scene, which depends on the scene's numbers."""
         own, start = self._builders.state_of(self.model), self._course.start
         if self.scene.start == SETTLE and start.time[0] == 0.0:
-            moving = start.velocity, start.spin, start.body_velocity, start.body_angular_velocity
-            if any(part.any() for part in moving):
-                raise InputError("gradient: a run is not differentiated through a start that settles and then moves")
             return True
         parts = ("time", "position", "velocity", "director1", "spin", "transduction", "body_position", "body_rotation")
         return all(np.array_equal(getattr(own, part), getattr(start, part)) for part in parts)
@@ -213,9 +216,14 @@ class VariedNumbers:
             found.agains, found.own = [self.again(self._builders.model_of(scene)) for scene in scenes], True
             raised = [of.problem.raised.edge for of in (found.agains[0], self.here)]
             if found.agains[0].end_rates.size != self.here.end_rates.size or not np.array_equal(*raised):
-                states = [self._builders.state_of(again.model) for again in found.agains]
-                wet = np.zeros(found.agains[0].wet)
-                found.rates = [(of.strain_rate, np.concatenate([of.strain_acceleration, wet])) for of in states]
+                rates = self._first_rates(found)
+                more = np.zeros(found.agains[0].end_rates.size * self._history + found.agains[0].wet)
+                if self.here.excess:
+                    raise InputError(
+                        f"gradient: {path} makes layers unlike, and implicit_midpoint then steps added mass in another "
+                        "way; choose another integrator"
+                    )
+                found.rates = [(of, more) for of in rates]
         for again in found.agains:
             refuse_other_plane(self.model, again.model, path, moves=False)
         if any(
@@ -271,8 +279,9 @@ class VariedNumbers:
             if holder >= 0:
                 motion = place[here.of_bodies[holder]]
                 place[here.of_nodes[node]] = motion[:3] + np.cross(motion[3:], arm)
-        momenta = [self.momenta(of, state) for of, state in zip(number.agains, states, strict=False)]
-        if momenta and len(free):
+        if len(free):
+            agains = number.agains or [here] * len(states)
+            momenta = [self.momenta(of, state) for of, state in zip(agains, states, strict=True)]
             speed[here.of_bodies[:, 3:]] = slope(momenta, h)
         rates = rate("strain_rate") if number.rates is None else np.zeros(here.end_rates.size)
         alike = len(states[0].transduction) == len(own.transduction)
@@ -287,12 +296,24 @@ class VariedNumbers:
         place[here.of_nodes[held.node[held.free < 0]]] = 0.0
         return place, speed, rates, reached
 
+    def _first_rates(self, number: Number) -> list[Array]:
+        """Return the rates of strains of other models at the start of their runs."""
+        if not self.from_start or self.scene.start != SETTLE:
+            return [self._builders.state_of(again.model).strain_rate for again in number.agains]
+        h, states = self._settled(number)
+        rates = [state.strain_rate for state in states]
+        return [np.mean(rates, axis=0) + place * self.step * number.scale * slope(rates, h) for place in PLACES]
+
     def _settled(self, number: Number) -> tuple[float, list[State]]:
-        """Return a step of a number, and the equilibria from which runs begin with it at `PLACES`."""
+        """Return a step of a number, and the states from which runs begin with it at `PLACES`."""
         rest = Equilibrium(self._stepper, self._course.start, self._builders, self._description)
         response = rest.respond(rest.parameters([number.path])[number.path][0])
-        motions = [response.motion * (place * response.h) for place in PLACES]
-        return response.h, [near.moved(motion) for near, motion in zip(response.nearby, motions, strict=True)]
+        states = []
+        for near, place in zip(response.nearby, PLACES, strict=True):
+            states.append(near.moved(response.motion * (place * response.h)))
+            set_in_motion(near.model, states[-1])
+            turn_directors(near.model, states[-1])
+        return response.h, states
 
     def _arms(self, state: State) -> Array:
         """Return the arms of nodes that bodies hold, shape (n_held, 3)."""
@@ -327,6 +348,7 @@ class VariedNumbers:
             [],
             np.zeros(here.size),
             np.zeros(here.size),
+            np.zeros(here.size),
             np.zeros(here.end_rates.size),
             np.zeros(here.transduction.size),
             np.zeros(here.end_rates.size + here.wet),
@@ -338,9 +360,12 @@ class VariedNumbers:
                 self._replayed(again, replace(step, start=self.fitted(again, step.start, rates)), reached)
                 for again, rates in zip(number.agains, own, strict=True)
             ]
-            *found.gradient, found.kept, held, momenta, reached_by, rates, push = (
+            *found.gradient, turned, found.kept, released, held, momenta, reached_by, rates, push = (
                 slope(values, h) for values in zip(*seen, strict=True)
             )
+            found.speed[here.of_nodes] = released
+            if not self.model.plane.exists:
+                found.place[here.of_edges] = turned
             for rows, (speed, gained) in ((here.held, held), (here.of_bodies[:, 3:], momenta)):
                 found.speed[rows] = speed
                 if self._history:
@@ -375,9 +400,14 @@ class VariedNumbers:
             of_fluid = (of_fluid - carry * again.wetted(step.start.fluid_force)) / (1.0 - carry)
             if not step.method.history:
                 push[: again.problem.raised.first if again.problem.raised.exists else None] = 0.0
+        released, excess = again.release()
+        tangent, director = again.last.tangent[: len(again.of_edges)], again.last.director1[: len(again.of_edges)]
+        before = carried(tangents_of(self.model.rods.edge_node, step.end.position), tangent, step.end.director1)
         return [
             *gradients,
-            np.concatenate([speeds_at_end(again)[0], light_rates(again, step)]),
+            np.einsum("ki,ki->k", np.cross(before, director), tangent),  # turns: nodes that bodies hold turn edges
+            np.concatenate([speeds_at_end(again)[0], light_rates(again, step), excess]),
+            released,
             again.speeds_of_held,
             again.momenta_of_bodies,
             again.transduction.copy(),
