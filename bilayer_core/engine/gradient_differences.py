@@ -6,6 +6,7 @@ from bilayer_core.contact.gap import gap_normal
 from bilayer_core.engine.configuration import move
 from bilayer_core.engine.laws import grow
 from bilayer_core.engine.linear.assembly import expand_gradient
+from bilayer_core.engine.linear.lacking_matrix import LackingMatrix
 from bilayer_core.engine.potential import (
     add_forces,
     expand_to_unknowns,
@@ -16,6 +17,7 @@ from bilayer_core.forces.elements import start_elements
 from bilayer_core.forces.rod_contact import find_rod_contacts
 from bilayer_core.jit import kernel, piece, record
 from bilayer_core.jit.record import Flags, Indices, Matrix, Vector
+from bilayer_core.kinematics.copying import copy
 from bilayer_core.model.records.problem import Problem
 from bilayer_core.model.records.status import READY
 from bilayer_core.model.records.step import Configuration, Stage, Work
@@ -47,7 +49,10 @@ class StrainDifferences:
     together.
     """
 
-    by_law: Matrix  # shape (n_law, size)
+    by_law: LackingMatrix
+    law_colour: Indices
+    by_laws: Matrix  # a row for each colour of laws
+    own: Vector  # eigenstrains of laws, as they are
     colour: Indices  # of strains, −1 for those that stay
     by_strain: Matrix  # a row for each colour
 
@@ -200,18 +205,22 @@ def write_gaps(p, at, out):
 @piece(int, Problem, Work, StrainDifferences, Configuration, float)
 def differentiate_by_laws(p, work, differences, at, change):
     """Write how the gradient of the selected forces, without contact, depends on the eigenstrain of each law."""
-    strain, stage, by_law = work.strain, work.stage, differences.by_law
-    by_law[:] = 0.0
-    for i in range(strain.shape[0]):
-        own = strain[i]
+    strain, stage, own, rows = work.strain, work.stage, differences.own, differences.by_laws
+    by_law, colour = differences.by_law, differences.law_colour
+    rows[:] = 0.0
+    copy(strain, own)
+    for row in range(rows.shape[0]):
         for side in range(-1, 2, 2):
-            strain[i] = own + side * change
+            for i in range(strain.shape[0]):
+                strain[i] = own[i] + side * change if colour[i] == row else own[i]
             grow(p.drives, strain, stage.rest_edge, stage.rest_joint)
             start_elements(0, p, at, stage)
-            _add_gradient(p, at, stage, side / (2.0 * change), by_law, i)
-        strain[i] = own
+            _add_gradient(p, at, stage, side / (2.0 * change), rows, row)
+    copy(own, strain)
     grow(p.drives, strain, stage.rest_edge, stage.rest_joint)
     start_elements(0, p, at, stage)
+    for k in range(by_law.count[0]):
+        by_law.value[k] = rows[colour[by_law.column[k]], by_law.row[k]]
     return READY
 
 

@@ -79,7 +79,7 @@ class ElasticMaps:
     strains: StrainMap
     fluid: FluidMap
     resistance: Vector  # of motions of joints and guides, shape (n_strain,)
-    by_law: Matrix  # of the gradient by eigenstrains, shape (n_law, size)
+    by_law: LackingMatrix  # of the gradient by eigenstrains
     law_slope: Vector  # of eigenstrains by what laws follow, with gains
     law_by_gain: Vector
     by_reached: LackingMatrix  # of what modes reach, by what others had reached
@@ -130,6 +130,7 @@ class StepWork:
     guess: Vector
     before: Vector  # turns of edges where a stage began, beyond those of frames, shape (n_edge,)
     reached: Vector
+    strain: Vector  # of laws
 
 
 @kernel
@@ -338,12 +339,11 @@ def go_forward(p, at, stage, method, lack, lacks, c, maps, elastic, bodies, star
         right[maps.slides.row[k]] += maps.slides.value[k] * bodies.motion[j // 6, j % 6]
     gather(p, at, right)
     push_bodies(p, bodies, -1.0 / (length * momentum_length), right)
-    for i in range(elastic.by_law.shape[0]):
-        strain = elastic.law_by_gain[i] * acts.gain[i]
+    for i in range(w.strain.shape[0]):
+        w.strain[i] = elastic.law_by_gain[i] * acts.gain[i]
         for m in range(c.channel.shape[0]):
-            strain += elastic.law_slope[i] * c.followed[i, m] * w.reached[m]
-        for j in range(size):
-            right[j] += elastic.by_law[i, j] * strain
+            w.strain[i] += elastic.law_slope[i] * c.followed[i, m] * w.reached[m]
+    multiply(elastic.by_law, w.strain, False, right)
     for j in range(size):
         right[j] = c.free[j] * (right[j] + acts.direct[n, j])
     _solve(p, at, lack, lacks, False, right, moved)
@@ -542,13 +542,12 @@ def go_backward(p, at, stage, method, lack, lacks, c, maps, elastic, bodies, end
     last = n + 1 == method.couplings.shape[0]
     for m in range(c.channel.shape[0]):
         w.reached[m] = end_.reached[m] if last else 0.0
-    for i in range(elastic.by_law.shape[0]):
-        strain = 0.0
-        for j in range(size):
-            strain += elastic.by_law[i, j] * right[j]
-        acts.gain[i] += elastic.law_by_gain[i] * strain
+    w.strain[:] = 0.0
+    multiply(elastic.by_law, right, True, w.strain)
+    for i in range(w.strain.shape[0]):
+        acts.gain[i] += elastic.law_by_gain[i] * w.strain[i]
         for m in range(c.channel.shape[0]):
-            w.reached[m] += elastic.law_slope[i] * c.followed[i, m] * strain
+            w.reached[m] += elastic.law_slope[i] * c.followed[i, m] * w.strain[i]
     for m in range(c.channel.shape[0]):
         k = c.channel[m]
         start.reached[m] += elastic.lag[0, m] * w.reached[m]

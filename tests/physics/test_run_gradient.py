@@ -103,6 +103,9 @@ RESTS = {"start": "settle", "stimuli.swelling.schedule.from": 0.3}
 THROWN = FREE | {"velocity": [0.05, 0.1, 0.2], "angular_velocity": [3.0, 5.0, -4.0]}
 MOVES_OFF = AT_TIP | RESTS | {"bodies": [WALL, AT_TIP["bodies"][1] | {"motion": THROWN}]}
 ON_RAIL = {"bodies.wall.motion": GUIDE | {"speed": 0.2}}
+PROFILE = {GAIN: {"at": np.linspace(0, 0.1, 8).tolist(), "value": np.linspace(0.02, -0.01, 8).tolist()}}
+POINTS = [f"{GAIN}.value.{k}" for k in (0, 3, 5)]
+STRIP = {"rods.strip.section": "strip", LEVEL: 0.3}
 CASES = {
     "in a plane": ("bending", HANGING, 0.2, [GAIN, LEVEL, TIME, MODULUS, THICKNESS, "gravity.2", LENGTH]),
     "in space": ("bending", HANGING | SPACE, 0.2, [GAIN, MODULUS, LENGTH]),
@@ -127,7 +130,10 @@ CASES = {
     "added mass of unlike layers": ("bending", WADES, 0.05, [GAIN, THICKNESS, "loads.0.force.2"]),
     "added mass of layers that become unlike": ("bending", HANGING | ALPHA | IN_WATER | HEAVY, 0.05, [THICKNESS]),
     "a clamp that moves": ("bending", HANGING | MOVES, 0.1, [GAIN, "bodies.wall.motion.displacements.1.2"]),
-    "a strip that curls": ("bending", HANGING | {"rods.strip.section": "strip", LEVEL: 0.3}, 0.2, [GAIN, MODULUS]),
+    "a strip that curls": ("bending", HANGING | STRIP, 0.2, [GAIN, MODULUS]),
+    "points of gains of a strip that curls": ("bending", HANGING | STRIP | PROFILE, 0.1, POINTS),
+    "points of gains of two rods": ("bending", HANGING | VISCOUS | {"solver.model": "two_rod"} | PROFILE, 0.05, POINTS),
+    "points of gains on a body in space": ("bending", TURNING | PROFILE, 0.03, POINTS),
     "fibres in space": ("chiral_pod", {}, 0.02, ["gravity.2"]),
     "drag in a plane": ("flagellum", STILL_WATER, 0.05, ["fluid.density", "materials.film.youngs_modulus"]),
     "drag in space": ("bending", HANGING | IN_WATER, 0.1, [GAIN, "fluid.density"]),
@@ -198,7 +204,7 @@ RUBBING = {
     "a walker": ("crawling_dual_leg", STRIDE, 0.002, ["gravity.2", "contact.friction.backward"], FOOT),
     "a walker on a place that slides": ("crawling_dual_leg", ALIKE, 0.005, [COEFFICIENT, GAIN_OF_TRUNK], "com"),
 }
-STEPS = {LENGTH: 1e-5}
+STEPS = {LENGTH: 1e-5} | dict.fromkeys(POINTS, 1e-2)
 """Differences of second order have their least errors with these, else with 1e-4."""
 
 

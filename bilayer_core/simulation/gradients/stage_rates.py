@@ -1,13 +1,12 @@
 """Linear maps of a stage of a step that was made; `engine.step_response` has what they are for.
 
 ∂g/∂η of eigenstrains and ∂σ/∂q of viscous strains are read off the gradient itself, which is linear in the strains of
-the origin: one evaluation for as many of them as no unknown sees together. In η of strips that curl it is not, which
-takes two evaluations for each law.
+the origin, but not in η of strips that curl: one evaluation, or two, for as many of them as no unknown sees together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -65,7 +64,8 @@ class Constants:
         self.size, self.strains = again.size, again.stage.origin_strain.size
         self.whole = self.size + self.strains + again.wet
         self.in_space = problem.space.exists
-        self.nodes = again.of_nodes
+        self.nodes, constrained = again.of_nodes, problem.constrained
+        self.holder = {node: f for node, f in zip(constrained.node, constrained.free, strict=True) if f >= 0}
         self.spin_inertia = strands.spin_inertia if self.in_space else 0.0 * strands.spin_inertia
         self.damping = problem.damping
         self.viscous = self._viscous(again)
@@ -85,7 +85,10 @@ class Constants:
         self.moves, gaps = moves[:, None], problem.restitution
         self.of_gaps = slice(gaps.first, gaps.first + len(gaps.rate))
         self.raised_rows = problem.raised.first + 3 * problem.raised.slot[:, None] + np.arange(3)
-        self.colour, self.colours, self.seen = self._colours(again)
+        of_strains, of_laws = self._strains_seen(again), self._laws_seen(again)
+        self.colour, self.colours, self.seen = _coloured(of_strains)
+        self.law_colour, self.law_colours, (law, unknown) = _coloured(of_laws)
+        self.by_law = Entries(unknown, law, np.zeros(len(law)), (self.size, len(of_laws)))
         drives = problem.drives
         rows = np.repeat(np.arange(len(drives.law_gain)), np.diff(drives.law_first))
         within = np.arange(len(rows)) - drives.law_first[rows]
@@ -166,41 +169,55 @@ class Constants:
         chosen = sparse.csr_matrix((np.ones(len(which)), (which, np.arange(len(which)))), (self.strains, len(which)))
         return (chosen @ linalg.inv(resisted.tocsc()[which][:, which].tocsc()) @ chosen.T).tocsr()
 
-    def _colours(self, again: StepAgain) -> tuple[Array, int, tuple[Array, Array]]:
-        """Return colours of viscous strains, −1 of others, such that those of one colour share no unknown, how many
-        there are, and each strain with each unknown that it depends on.
-        """
+    def _strains_seen(self, again: StepAgain) -> list[Array]:
+        """Return the unknowns on which each viscous strain depends; none for others."""
         strands, bonds = again.problem.strands, again.problem.bonds
-        edges, constrained = strands.edge_count, again.problem.constrained
-        holder = {node: f for node, f in zip(constrained.node, constrained.free, strict=True) if f >= 0}
-        clamped = again.problem.bodies.free_index[constrained.clamp_edge_body]
-
-        def of(*which: int, more: Sequence[int] = ()) -> Array:
-            inner = sorted({e for e in which if e < edges})
-            nodes = {n for e in inner for n in (strands.edge_node[e], strands.edge_node[e] + 1)} | set(more)
-            bodies = {holder[n] for n in nodes if n in holder} | {clamped[e - edges] for e in which if e >= edges}
-            held = again.of_bodies[sorted(bodies - {-1})]
-            parts = self.nodes[sorted(nodes - set(holder))], strands.edge_unknown[inner], held
-            return np.concatenate([part.ravel() for part in parts]).astype(int)
-
-        colour = np.full(self.strains, -1)
-        viscous = np.flatnonzero(self.viscous > 0.0)
-        if not len(viscous):
-            return colour, 0, (viscous, viscous)
         joints = strands.joint_a, strands.joint_b
-        seen = [of(e, *(joints[s][k] for k in self.bending.get(e, ()) for s in range(2))) for e in range(edges)]
-        seen += [of(a, b) for a, b in zip(strands.joint_a, strands.joint_b, strict=True) for _ in range(3)]
-        for k in range(len(bonds.joint)):
-            seen += [of(strands.joint_a[bonds.joint[k]], strands.joint_b[bonds.joint[k]], more=bonds.node[k])] * 3
-        taken: list[set[int]] = []
-        for k in viscous:
-            unknowns = set(seen[k].tolist())
-            colour[k] = next((g for g, others in enumerate(taken) if others.isdisjoint(unknowns)), len(taken))
-            if colour[k] == len(taken):
-                taken.append(set())
-            taken[colour[k]] |= unknowns
-        which = np.repeat(viscous, [len(seen[k]) for k in viscous])
-        return colour, len(taken), (which, np.concatenate([seen[k] for k in viscous]))
+        edges = [
+            [e, *(joints[s][k] for k in self.bending.get(e, ()) for s in range(2))] for e in range(strands.edge_count)
+        ]
+        edges += [[a, b] for a, b in zip(*joints, strict=True) for _ in range(3)]
+        more: list[Sequence[int]] = [()] * len(edges)
+        for joint, nodes in zip(bonds.joint, bonds.node, strict=True) if len(bonds.joint) else ():
+            edges, more = edges + 3 * [[joints[0][joint], joints[1][joint]]], more + 3 * [nodes]
+        seen = [np.zeros(0, dtype=int)] * self.strains
+        for k in np.flatnonzero(self.viscous > 0.0):
+            seen[k] = self._unknowns(again, edges[k], more[k])
+        return seen
+
+    def _laws_seen(self, again: StepAgain) -> list[Array]:
+        """Return the unknowns whose gradient depends on the eigenstrain of each law: those of edges and joints that it
+        drives and of the edges next to them; all for multiples of moduli.
+        """
+        strands, drives, flattening = again.problem.strands, again.problem.drives, again.problem.flattening
+        joints = np.stack([strands.joint_a, strands.joint_b], axis=1)
+        next_to: dict[int, set[int]] = {}
+        for a, b in joints.tolist():
+            next_to.setdefault(a, {a}).add(b)
+            next_to.setdefault(b, {b}).add(a)
+        of_row = np.concatenate([np.arange(len(joints)), flattening.joint])
+        seen = []
+        for law in range(len(drives.law_gain)):
+            rows = drives.driven_joint[drives.driven_joint_law == law]
+            if len(rows) and rows.max() >= len(of_row):
+                seen.append(np.arange(self.size))
+                continue
+            driven = {*drives.driven_edge[drives.driven_law == law].tolist(), *joints[of_row[rows]].ravel().tolist()}
+            near = set().union(*(next_to.get(e, {e}) for e in driven))
+            seen.append(self._unknowns(again, near))
+        return seen
+
+    def _unknowns(self, again: StepAgain, edges: Iterable[int], more: Iterable[int] = ()) -> Array:
+        """Return the unknowns of edges, of which the last ones are clamps, and of more nodes."""
+        strands, constrained = again.problem.strands, again.problem.constrained
+        inner = sorted({e for e in edges if e < strands.edge_count})
+        nodes = {n for e in inner for n in (strands.edge_node[e], strands.edge_node[e] + 1)} | set(more)
+        clamped = again.problem.bodies.free_index[constrained.clamp_edge_body]
+        bodies = {self.holder[n] for n in nodes if n in self.holder}
+        bodies |= {clamped[e - strands.edge_count] for e in edges if e >= strands.edge_count}
+        held = again.of_bodies[sorted(bodies - {-1})]
+        parts = self.nodes[sorted(nodes - set(self.holder))], strands.edge_unknown[inner], held
+        return np.concatenate([part.ravel() for part in parts]).astype(int)
 
     def strains_of(self, row: Array, column: Array, force: Array) -> Entries:
         """Return changes of strains that resist with some forces."""
@@ -211,6 +228,23 @@ class Constants:
 
         found = (self.apart @ sparse.csr_matrix((force, (row, column)), shape)).tocoo()
         return Entries(found.row.astype(np.int64), found.col.astype(np.int64), found.data, shape)
+
+
+def _coloured(seen: Sequence[Array]) -> tuple[Array, int, tuple[Array, Array]]:
+    """Return colours of what sees some unknowns, −1 where it sees none, such that those of one colour share no unknown,
+    how many there are, and each of them with each unknown that it sees.
+    """
+    colour, taken = np.full(len(seen), -1), [set[int]()][:0]
+    for k, own in enumerate(seen):
+        if not len(own):
+            continue
+        unknowns = set(own.tolist())
+        colour[k] = next((g for g, others in enumerate(taken) if others.isdisjoint(unknowns)), len(taken))
+        if colour[k] == len(taken):
+            taken.append(set())
+        taken[colour[k]] |= unknowns
+    which = np.repeat(np.arange(len(seen)), [len(own) for own in seen])
+    return colour, len(taken), (which, np.concatenate([np.zeros(0, dtype=int), *seen]))
 
 
 class StageRates:
@@ -225,7 +259,7 @@ class StageRates:
             strains=StrainMap(viscous=_list(entries), directors=np.zeros((len(problem.raised.edge), 3, 7))),
             fluid=FluidMap(by_place=_list(wet), by_speed=_list(wet)),
             resistance=np.zeros(strains),
-            by_law=np.zeros((laws, again.size)),
+            by_law=_list(0, constants.by_law),
             law_slope=np.zeros(laws),
             law_by_gain=np.zeros(laws),
             by_reached=_list(modes * modes if problem.varied_fields.exists else 0),
@@ -240,6 +274,9 @@ class StageRates:
         self.bodies = BodyMaps(**one, history=np.zeros((3, bodies, 3, 3)), motion=np.zeros((bodies, 6)))
         self.differences = StrainDifferences(
             by_law=self.elastic.by_law,
+            law_colour=constants.law_colour,
+            by_laws=np.zeros((constants.law_colours, again.size)),
+            own=np.zeros(laws),
             colour=constants.colour,
             by_strain=np.zeros((constants.colours, again.size)),
         )

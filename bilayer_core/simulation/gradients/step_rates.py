@@ -127,6 +127,7 @@ class StepRates:
             moved=np.zeros(size),
             before=np.zeros(len(again.of_edges)),
             reached=np.zeros(len(self.constants.record.channel)),
+            strain=np.zeros(len(again.laws)),
         )
 
     def take(self, step: KeptStep) -> list[Reached]:
