@@ -207,16 +207,37 @@ def _placed(scene: SceneConfig, rod: Rod) -> list[_Placed]:
     return scene.keep("layers in place", (rod,), lambda: _layers_in_place(scene, rod))
 
 
+def axis_parts(scene: SceneConfig, rod: Rod) -> tuple[Array, Array]:
+    """Return moments about the path and weights of the edges, shapes (n_edge,): the height of the curve over the path
+    is the sum of those over the sum of these.
+
+    It is the mean height of the neutral axis where most edges have the same layers. B = 0 there: Σ (EA/λ) (y − y₀) = 0
+    with λ in proportion to the layers' lengths, whatever y₀ is.
+    """
+    layers = _placed(scene, rod)
+    present = np.array([layer.present >= 0.5 for layer in layers])
+    there = _prevailing(present)
+    if plate_of(scene, rod) is not None:
+        middles = rod.edge_length * rod.on_path(np.arange(present.shape[1]) + 0.5)
+        return there * PlateSection(scene, rod, middles, present.astype(float)).axis, there.astype(float)
+    weight = [
+        there * own * layer.section.axial_stiffness / layer.length for own, layer in zip(present, layers, strict=True)
+    ]
+    return sum(w * layer.height for w, layer in zip(weight, layers, strict=True)), np.sum(weight, axis=0)
+
+
+def hold_axis(scene: SceneConfig, rod: Rod, height: float) -> None:
+    """Let a scene of which nothing is built have the curve of a rod at a height over the path [m], off its axis."""
+    for copy in rod.copies:
+        scene.keep("axis", (copy.rod,), lambda: height)
+
+
 def _axis_of(scene: SceneConfig, rod: Rod) -> float:
     """Return the height of the curve over the path [m]."""
 
     def made() -> float:
-        if plate_of(scene, rod) is None:
-            return _axis(_placed(scene, rod))
-        present = np.array([layer.present >= 0.5 for layer in _placed(scene, rod)])
-        middles = rod.edge_length * rod.on_path(np.arange(present.shape[1]) + 0.5)
-        heights = PlateSection(scene, rod, middles, present.astype(float)).axis
-        return float(heights[_prevailing(present)].mean())
+        moment, weight = axis_parts(scene, rod)
+        return float(moment.sum() / weight.sum())
 
     return scene.keep("axis", (rod,), made)
 
@@ -236,20 +257,6 @@ def _layers_in_place(scene: SceneConfig, rod: Rod) -> list[_Placed]:
         present = rod.covered_parts(own, layer)
         layers.append(_Placed(section, present, lengths, side(rod, slot) * section.thickness))
     return layers
-
-
-def _axis(layers: list[_Placed]) -> float:
-    """Return the height over the path [m] of the neutral axis where most edges have the same layers, mean over these.
-
-    B = 0 there: Σ (EA/λ) (y − y₀) = 0 with λ in proportion to the layers' lengths, whatever y₀ is.
-    """
-    present = np.array([layer.present >= 0.5 for layer in layers])
-    there = _prevailing(present)
-    weight = [
-        (own * layer.section.axial_stiffness / layer.length)[there] for own, layer in zip(present, layers, strict=True)
-    ]
-    moment = sum(np.vdot(w, layer.height[there]) for w, layer in zip(weight, layers, strict=True))
-    return float(moment / np.sum(weight))
 
 
 def _prevailing(present: Array) -> Array:

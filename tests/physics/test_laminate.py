@@ -39,7 +39,7 @@ def test_every_node_has_timoshenkos_curvature(m, n):
 def test_curvature_and_faces_do_not_depend_on_where_the_curve_lies(height, monkeypatch):
     content = strip(2.0, 0.5, 0.05)
     on_axis = settled(content)
-    monkeypatch.setattr(laminate, "_axis", lambda _: height)
+    monkeypatch.setattr(laminate, "_axis_of", lambda *_: height)
     beside = settled(content)
     assert len(on_axis.model.off_axis.joint) == 0 < len(beside.model.off_axis.joint)
     assert beside.curvatures == pytest.approx(on_axis.curvatures, rel=1e-9)
@@ -61,7 +61,7 @@ def test_wherever_the_curve_of_an_arch_lies_its_joints_have_the_same_angles(natu
     arc = {"shape": "arc", "start": [0, 0, 0], "direction": [1, 0, 0], "radius": 0.02, "angle": 2.0}
     content = scene([rod(layers, stations=41, clamp_start="wall") | {"path": arc}], bodies=[fixed()], stimuli=HEAT)
     on_axis = settled(content)._stepper.engine.end.joint_strain
-    monkeypatch.setattr(laminate, "_axis", lambda _: -1e-3)
+    monkeypatch.setattr(laminate, "_axis_of", lambda *_: -1e-3)
     beside = settled(content)._stepper.engine.end.joint_strain
     limits = np.array([2e-6, 1e-12, 1e-12])  # nodes are on the offset arc, not at the corners of the offset polygon
     assert np.all(np.abs(beside - on_axis).max(axis=0) < limits * np.abs(on_axis).max())

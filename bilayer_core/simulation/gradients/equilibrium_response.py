@@ -18,13 +18,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from bilayer_core.engine.evaluator import Evaluator
-from bilayer_core.errors import InputError, SimulationError
+from bilayer_core.errors import InputError, SceneError, SimulationError
 from bilayer_core.model.model import Model
 from bilayer_core.model.state import State
 from bilayer_core.observed.frame import Description
@@ -43,6 +44,7 @@ from bilayer_core.simulation.gradients.nearby import (
     slope,
 )
 from bilayer_core.simulation.gradients.parameters import (
+    SMALL,
     STEP,
     Parameter,
     laws_of,
@@ -50,6 +52,7 @@ from bilayer_core.simulation.gradients.parameters import (
     scale_of,
     scene_with,
 )
+from bilayer_core.simulation.gradients.value_places import ByPlace, groups_of
 from bilayer_core.simulation.stepper import Stepper
 
 Array = np.ndarray
@@ -174,9 +177,10 @@ class Equilibrium:
 
     def fits(self, model: Model) -> bool:
         """Return whether states of a model have the same unknowns."""
-        return model.layout.size == self.model.layout.size and _shapes(self._builders.state_of(model)) == _shapes(
-            self._state
-        )
+        return self._fits(model, self._builders.state_of(model))
+
+    def _fits(self, model: Model, state: State) -> bool:
+        return model.layout.size == self.model.layout.size and _shapes(state) == _shapes(self._state)
 
     def write_shape(self, state: State) -> None:
         """Give a state of the same model, or of one with other numbers, the shape, the stimuli and the loads."""
@@ -214,32 +218,61 @@ class Equilibrium:
 
     def velocities(self, parameters: Sequence[Parameter]) -> Array:
         """Return dx/dp of nodes by each parameter from one difference each: exact where forces are linear in it, as in
-        gains, shape (n_node, 3, n_parameter).
+        gains, else to 1e-5; shape (n_node, 3, n_parameter).
         """
-        here = self._here(self._stimulus, self._gains)
-        gradient, columns = here.gradient(here.state), []
-        places, gains = self.model.layout.node[:, None] + np.arange(3), here.gradients_by_gains()
-        for parameter in parameters:
-            h, shift = STEP * parameter.scale, 0.0
+        here, found = self._here(self._stimulus, self._gains), np.zeros((*self.positions.shape, len(parameters)))
+        gradient, places = here.gradient(here.state), self.model.layout.node[:, None] + np.arange(3)
+        gains = here.gradients_by_gains()
+
+        def note(k: int, h: float, change: Motion, shift: Array | float = 0.0) -> None:
+            found[..., k] = self._solved(change * (1.0 / h)).unknowns[places] + shift / h
+
+        for k, parameter in enumerate(parameters):
             if parameter.laws.size:
-                changed = self._gains.copy()
+                changed, h = self._gains.copy(), STEP * parameter.scale
                 changed[parameter.laws] += h
-                other = gains(changed)
-            else:
-                near = parameter.at(parameter.value + h)
-                other, shift = near.gradient(near.state), near.state.position - self._state.position
-            motion = self._solved((other + gradient * -1.0) * (1.0 / h))
-            columns.append(motion.unknowns[places] + shift / h)
+                note(k, h, gains(changed) + gradient * -1.0)
         put_gains(self.model, self._gains)
-        return np.stack(columns, axis=-1)
+        others = [parameter for parameter in parameters if not parameter.laws.size]
+        numbers = [k for k, parameter in enumerate(parameters) if not parameter.laws.size]
+        for k, of in zip(numbers, self._differences(others, gradient), strict=True):
+            note(k, SMALL * parameters[k].scale, *of)
+        put_gains(self.model, self._gains)
+        return found
+
+    def _differences(self, parameters: Sequence[Parameter], gradient: Motion) -> list[tuple[Motion, Array]]:
+        """Return how the gradient and the positions differ in models with each of some parameters changed a little,
+        several at once where places tell them apart.
+        """
+
+        def change(near: Nearby) -> tuple[Motion, Array]:
+            return near.gradient(near.state) + gradient * -1.0, near.state.position - self._state.position
+
+        def changes_in(scene: SceneConfig) -> list[Array]:
+            motion, shift = change(self._in(scene, "a profile"))
+            return [motion.unknowns, motion.bodies, shift]
+
+        by_place, found = ByPlace(self.model, self.scene, changes_in), {}
+        values = [parameter.value + SMALL * parameter.scale for parameter in parameters]
+        for group in groups_of(self.scene, self.model, parameters):
+            told = None
+            if len(group) > 1:
+                with suppress(InputError, SceneError):  # told by the value that is to blame, alone
+                    scene = scene_with(self.scene, {parameters[k].name: values[k] for k in group})
+                    told = by_place.told(scene, list(group.values()))
+            if told is None:
+                found |= {k: change(parameters[k].at(values[k])) for k in group}
+            else:
+                found |= {k: (Motion(*of[:2]), of[2]) for k, of in zip(group, told, strict=True)}
+        return [found[k] for k in range(len(parameters))]
 
     def _here(self, stimulus: Array, gains: Array) -> Nearby:
         """Return the present model with other stimuli or gains."""
         return Nearby(self._stepper, self._evaluator, self._state.copy(), stimulus, gains, self._description)
 
-    def _with(self, path: str, value: float) -> Nearby:
-        """Return the model with another number in its scene."""
-        model = self._builders.model_of(scene_with(self.scene, path, value))
+    def _in(self, scene: SceneConfig, path: str) -> Nearby:
+        """Return the model of the scene in which a path has another number."""
+        model = self._builders.model_of(scene)
         refuse_other_plane(self.model, model, path)
         stepper = self._builders.stepper_of(model)
         state = self._carried(model)
@@ -251,7 +284,7 @@ class Equilibrium:
     def _carried(self, model: Model) -> State | None:
         """Return the state of another model that departs from its start as the present one does."""
         state, here, start = self._builders.state_of(model), self._state, self._start
-        if not self.fits(model):
+        if not self._fits(model, state):
             return None
         turned = state.body_rotation @ start.body_rotation.swapaxes(1, 2)
         same = np.array_equal(state.body_rotation, start.body_rotation)
@@ -307,7 +340,12 @@ class Equilibrium:
             yield Parameter(name, float(self._stimulus[k]), channel.maximum - channel.minimum, driven)
             return
         for path, value in numbers_of(self.scene, name):
-            yield Parameter(path, value, scale_of(value), lambda value, path=path: self._with(path, value))
+            yield Parameter(
+                path,
+                value,
+                scale_of(value),
+                lambda value, path=path: self._in(scene_with(self.scene, {path: value}), path),
+            )
 
     def _of_laws(self, parameter: Parameter, laws: Array) -> Parameter:
         """Return a parameter that is the gain of laws, for which nothing is built."""

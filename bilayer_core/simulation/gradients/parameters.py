@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
@@ -21,6 +21,8 @@ from bilayer_core.simulation.gradients.nearby import Nearby
 Array = np.ndarray
 STEP = 1e-3
 """h of a parameter, over its size, and the largest displacement over it, of the longest rod."""
+SMALL = 1e-6
+"""h of a one-sided difference likewise: what it leaves out is as small as rounding."""
 GAIN = re.compile(r".*\.eigenstrain(\.\d+)?\.gain(\.value\.\d+)?")
 """Paths of gains."""
 
@@ -72,19 +74,21 @@ def numbers_of(scene: SceneConfig, name: str) -> Iterator[tuple[str, float]]:
         yield name + end, value
 
 
-def scene_with(scene: SceneConfig, path: str, value: float) -> SceneConfig:
-    """Return a scene with another number; of schedules only the channel is validated anew."""
+def scene_with(scene: SceneConfig, changes: Mapping[str, float]) -> SceneConfig:
+    """Return a scene with other numbers; of a schedule that changes alone only the channel is validated anew."""
+    path = next(iter(changes))
     name = next((name for name in scene.stimuli if path.startswith(f"stimuli.{name}.schedule.")), None)
-    if name is not None:
+    if name is not None and len(changes) == 1:
         content = {"stimuli": {name: scene.stimuli[name].model_dump(mode="json", by_alias=True)}}
-        read_overrides({path: value})[0].apply(content)
+        read_overrides(changes)[0].apply(content)
         with suppress(ValidationError):
             changed = Stimulus.model_validate(content["stimuli"][name])
             return scene.model_copy(update={"stimuli": scene.stimuli | {name: changed}})
     try:
-        return load_content(scene_content(scene), {path: value})
+        return load_content(scene_content(scene), changes)
     except SceneError as error:
-        raise SceneError(f"gradient: {path} cannot be varied about its value, to {value:.9g}: {error}") from error
+        told = " and ".join(f"{path} cannot be varied about its value, to {changes[path]:.9g}" for path in changes)
+        raise SceneError(f"gradient: {told}: {error}") from error
 
 
 def scale_of(value: float) -> float:

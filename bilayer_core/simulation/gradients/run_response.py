@@ -287,9 +287,9 @@ class RunResponse:
         """Return quantities at the end of the run where a number is another."""
         model = self.model
         if number.own:
-            model = self._builders.model_of(scene_with(self.scene, number.path, number.value + way))
+            model = self._builders.model_of(scene_with(self.scene, {number.path: number.value + way}))
         elif not number.gain.any():
-            model = replace(model, scene=scene_with(self.scene, number.path, number.value + way))
+            model = replace(model, scene=scene_with(self.scene, {number.path: number.value + way}))
         stepper, evaluator = self._builders.stepper_of(model), self._varied.again(model)
         state = self._varied.fitted(evaluator, self._course.end, number.rates and number.rates[0])
         at, there = evaluator.new(), evaluator.new()

@@ -201,7 +201,7 @@ class VariedNumbers:
         if laws is not None:
             found.gain[laws] = 1.0
             return found
-        scenes = [scene_with(self.scene, path, value + place * self.step * found.scale) for place in PLACES]
+        scenes = [scene_with(self.scene, {path: value + place * self.step * found.scale}) for place in PLACES]
         if all(not differing(self.scene, scene) for scene in scenes):
             models = [replace(self.model, scene=scene) for scene in scenes]
             around = [Surroundings(model, self._stepper.ahead) for model in models]
