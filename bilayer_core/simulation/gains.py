@@ -1,11 +1,13 @@
 """Gains of eigenstrains that change while a simulator keeps its arrays.
 
-The gains of laws are an array that kernels read (`Drives.law_gain`), with one law for each point of a profile. Nothing
-else of a model depends on them, as long as no more rods may meet.
+The gains of laws are an array that kernels read (`Drives.law_gain`), with one law for each point of a profile. On how
+far they may bend rods depends how finely contact is looked for between stations. Nothing else of a model depends on
+them, as long as no more rods may meet.
 """
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -15,36 +17,48 @@ from bilayer_core.jit.record import Record
 from bilayer_core.model.model import Model
 
 Array = np.ndarray
-OTHER = ("scene", "law_gain")
-"""What may differ."""
+GAINS = {"scene", "law_gain"}
+SPACING = {"sharpest", "coarsest"}
+"""How finely contact is looked for."""
 
 
-def alike_but_gains(model: Model, other: Model) -> bool:
-    """Return whether two models have the same arrays but for the gains of laws, of which they have as many."""
-    return len(model.drives.law_gain) == len(other.drives.law_gain) and _alike(model, other)
+def alike_but_gains(model: Model, other: Model, besides: Collection[str] = ()) -> bool:
+    """Return whether two models have the same arrays but for the gains of laws, of which they have as many, and
+    `besides` those with some names.
+    """
+    return len(model.drives.law_gain) == len(other.drives.law_gain) and _alike(model, other, {*GAINS, *besides})
 
 
 def put_gains(model: Model, gains: Array) -> None:
     """Write gains into a model in place, and so into whatever was built from it."""
-    held = model.drives.law_gain
+    _write(model.drives.law_gain, gains)
+
+
+def take_gains(model: Model, other: Model) -> None:
+    """Likewise write those of another model, with the `SPACING` that they ask for."""
+    put_gains(model, other.drives.law_gain)
+    for name in SPACING:
+        _write(getattr(model.surfaces, name), getattr(other.surfaces, name))
+
+
+def _write(held: Array, values: Array) -> None:
     held.flags.writeable = True
-    held[:] = gains
+    held[:] = values
     held.flags.writeable = False
 
 
-def _alike(one: Any, other: Any) -> bool:
+def _alike(one: Any, other: Any, differing: Collection[str]) -> bool:
     if isinstance(one, np.ndarray):
         return np.array_equal(one, other)
     if type(one) is not type(other):
         return False
+    names: Iterable[str] = ()
     if isinstance(one, Record):
         names = one.names if one.exists else ()
-        return one.exists == other.exists and all(
-            _alike(getattr(one, name), getattr(other, name)) for name in names if name not in OTHER
-        )
-    if is_dataclass(one):
+        if one.exists != other.exists:
+            return False
+    elif is_dataclass(one):
         names = [part.name for part in fields(one)]
-        return all(_alike(getattr(one, name), getattr(other, name)) for name in names if name not in OTHER)
     if isinstance(one, list | tuple):
-        return len(one) == len(other) and all(map(_alike, one, other))
-    return True
+        return len(one) == len(other) and all(_alike(*pair, differing) for pair in zip(one, other, strict=True))
+    return all(_alike(getattr(one, name), getattr(other, name), differing) for name in names if name not in differing)

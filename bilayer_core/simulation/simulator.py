@@ -35,7 +35,7 @@ from bilayer_core.simulation.controls import Controls
 from bilayer_core.simulation.energy_budget import EnergyLedger
 from bilayer_core.simulation.equilibrium import StaticReport, solve_static
 from bilayer_core.simulation.friction_changes import coefficients
-from bilayer_core.simulation.gains import alike_but_gains, put_gains
+from bilayer_core.simulation.gains import SPACING, alike_but_gains, take_gains
 from bilayer_core.simulation.gradients.derivatives import DifferentiableRun, Gradient, differentiate
 from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
 from bilayer_core.simulation.gradients.nearby import Builders
@@ -423,15 +423,15 @@ class Simulator:
             raise InputError("set_gains: takes no other gains while a log or an observer is attached; detach it first")
         scene = load_content(scene_content(self.scene), gains)
         other = build_model(scene, self.plan.model, self.plan.dimension)
-        paths = ", ".join(gains)
-        if not (all(re.search(r"\.gain(\.|$)", path) for path in gains) and alike_but_gains(self.model, other)):
+        paths, of_gains = ", ".join(gains), all(re.search(r"\.gain(\.|$)", path) for path in gains)
+        if not (of_gains and alike_but_gains(self.model, other, SPACING)):
             raise InputError(
                 f"set_gains: {paths}: changes more than gains; allowed are numbers for numbers, and profiles with as "
-                "many points as before; else make a new Simulator"
+                "many points as before, with which nothing else may touch; else make a new Simulator"
             )
 
         def take(stepper: Stepper) -> None:
-            put_gains(stepper.model, other.drives.law_gain)
+            take_gains(stepper.model, other)
             stepper.take_scene(scene, self.steps, scene.solver.max_newton_iterations)
 
         take(self._stepper)

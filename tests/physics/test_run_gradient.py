@@ -105,6 +105,7 @@ MOVES_OFF = AT_TIP | RESTS | {"bodies": [WALL, AT_TIP["bodies"][1] | {"motion": 
 ON_RAIL = {"bodies.wall.motion": GUIDE | {"speed": 0.2}}
 PROFILE = {GAIN: {"at": np.linspace(0, 0.1, 8).tolist(), "value": np.linspace(0.02, -0.01, 8).tolist()}}
 POINTS = [f"{GAIN}.value.{k}" for k in (0, 3, 5)]
+COPIES = {"rods.strip.pattern": {"type": "translation", "step": [0, 0.05, 0], "count": 3, "gains": [1, 0.5, -2]}}
 STRIP = {"rods.strip.section": "strip", LEVEL: 0.3}
 CASES = {
     "in a plane": ("bending", HANGING, 0.2, [GAIN, LEVEL, TIME, MODULUS, THICKNESS, "gravity.2", LENGTH]),
@@ -133,6 +134,7 @@ CASES = {
     "a strip that curls": ("bending", HANGING | STRIP, 0.2, [GAIN, MODULUS]),
     "points of gains of a strip that curls": ("bending", HANGING | STRIP | PROFILE, 0.1, POINTS),
     "points of gains of two rods": ("bending", HANGING | VISCOUS | {"solver.model": "two_rod"} | PROFILE, 0.05, POINTS),
+    "copies with factors": ("bending", HANGING | COPIES, 0.05, [GAIN]),
     "points of gains on a body in space": ("bending", TURNING | PROFILE, 0.03, POINTS),
     "fibres in space": ("chiral_pod", {}, 0.02, ["gravity.2"]),
     "drag in a plane": ("flagellum", STILL_WATER, 0.05, ["fluid.density", "materials.film.youngs_modulus"]),

@@ -47,10 +47,10 @@ from bilayer_core.simulation.gradients.parameters import (
     SMALL,
     STEP,
     Parameter,
-    laws_of,
     numbers_of,
     scale_of,
     scene_with,
+    shares_of,
 )
 from bilayer_core.simulation.gradients.value_places import ByPlace, groups_of
 from bilayer_core.simulation.stepper import Stepper
@@ -198,7 +198,7 @@ class Equilibrium:
         before = self.kept()
         try:
             for parameter, value in zip(gains, values, strict=True):
-                self._gains[parameter.laws] = value
+                self._gains[:] = np.where(parameter.share != 0.0, value * parameter.share, self._gains)
             self._changes = self._changes | {of.name: value for of, value in zip(gains, values, strict=True)}
             put_gains(self.model, self._gains)
             solve_static(self._stepper, self._state)
@@ -228,13 +228,12 @@ class Equilibrium:
             found[..., k] = self._solved(change * (1.0 / h)).unknowns[places] + shift / h
 
         for k, parameter in enumerate(parameters):
-            if parameter.laws.size:
-                changed, h = self._gains.copy(), STEP * parameter.scale
-                changed[parameter.laws] += h
-                note(k, h, gains(changed) + gradient * -1.0)
+            if parameter.share.size:
+                h = STEP * parameter.scale
+                note(k, h, gains(self._gains + h * parameter.share) + gradient * -1.0)
         put_gains(self.model, self._gains)
-        others = [parameter for parameter in parameters if not parameter.laws.size]
-        numbers = [k for k, parameter in enumerate(parameters) if not parameter.laws.size]
+        others = [parameter for parameter in parameters if not parameter.share.size]
+        numbers = [k for k, parameter in enumerate(parameters) if not parameter.share.size]
         for k, of in zip(numbers, self._differences(others, gradient), strict=True):
             note(k, SMALL * parameters[k].scale, *of)
         put_gains(self.model, self._gains)
@@ -322,9 +321,10 @@ class Equilibrium:
         """
         found = {name: list(self._parameters_of(name)) for name in names}
         numbers = [(p.name, p.value) for of in found.values() for p in of]
-        laws = laws_of(replace(self.model, scene=self.scene), self._builders.model_of, numbers)
+        shares = shares_of(replace(self.model, scene=self.scene), self._builders.model_of, numbers)
         return {
-            name: [self._of_laws(p, laws[p.name]) if p.name in laws else p for p in of] for name, of in found.items()
+            name: [self._of_laws(p, shares[p.name]) if p.name in shares else p for p in of]
+            for name, of in found.items()
         }
 
     def _parameters_of(self, name: str) -> Iterator[Parameter]:
@@ -347,15 +347,13 @@ class Equilibrium:
                 lambda value, path=path: self._in(scene_with(self.scene, {path: value}), path),
             )
 
-    def _of_laws(self, parameter: Parameter, laws: Array) -> Parameter:
+    def _of_laws(self, parameter: Parameter, share: Array) -> Parameter:
         """Return a parameter that is the gain of laws, for which nothing is built."""
 
         def gained(value: float) -> Nearby:
-            gains = self._gains.copy()
-            gains[laws] = value
-            return self._here(self._stimulus, gains)
+            return self._here(self._stimulus, np.where(share != 0.0, value * share, self._gains))
 
-        return replace(parameter, at=gained, laws=laws)
+        return replace(parameter, at=gained, share=share)
 
     def respond(self, parameter: Parameter) -> Response:
         """Return how the equilibrium moves with a parameter.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
@@ -23,6 +23,8 @@ STEP = 1e-3
 """h of a parameter, over its size, and the largest displacement over it, of the longest rod."""
 SMALL = 1e-6
 """h of a one-sided difference likewise: what it leaves out is as small as rounding."""
+SAME = 1e-9
+"""By which shares of gains differ, over their size, where they are the same."""
 GAIN = re.compile(r".*\.eigenstrain(\.\d+)?\.gain(\.value\.\d+)?")
 """Paths of gains."""
 
@@ -39,15 +41,15 @@ class Parameter:
         What its steps are parts of.
     at : callable
         Returns the model nearby at a value.
-    laws : ndarray
-        The laws whose gain it is, if nothing is built for it.
+    share : ndarray
+        How many times the gain of each law is this number, if nothing is built for it.
     """
 
     name: str
     value: float
     scale: float
     at: Callable[[float], Nearby]
-    laws: Array = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    share: Array = field(default_factory=lambda: np.zeros(0))
 
 
 def numbers_of(scene: SceneConfig, name: str) -> Iterator[tuple[str, float]]:
@@ -96,18 +98,29 @@ def scale_of(value: float) -> float:
     return abs(value) or 1.0
 
 
-def laws_of(model: Model, model_of: Callable[[SceneConfig], Model], numbers: Sequence[tuple[str, float]]) -> dict:
-    """Return which laws each gain among some numbers is that of, shape (n,), by its path, where nothing else of the
-    model depends on it.
+def shares_of(
+    model: Model,
+    model_of: Callable[[SceneConfig], Model],
+    numbers: Sequence[tuple[str, float]],
+    besides: Collection[str] = (),
+) -> dict[str, Array]:
+    """Return how many times the gain of each law is that of each gain among some numbers, shape (n_law,), by its path,
+    where nothing else of the model depends on it, `besides` arrays with some names. Copies may have factors.
     """
     gains = [(path, value) for path, value in numbers if GAIN.fullmatch(path)]
     if not gains:
         return {}
-    changed = {path: value + STEP * (1.0 + k / len(gains)) * scale_of(value) for k, (path, value) in enumerate(gains)}
-    other = model_of(load_content(scene_content(model.scene), changed))
-    if not alike_but_gains(model, other):
-        return {}
-    laws = {path: np.flatnonzero(other.drives.law_gain == value) for path, value in changed.items()}
-    moved = np.flatnonzero(other.drives.law_gain != model.drives.law_gain)
-    told = np.sort(np.concatenate(list(laws.values())))
-    return laws if np.array_equal(told, moved) and all(of.size for of in laws.values()) else {}
+    value, scale = np.array([(value, scale_of(value)) for _, value in gains]).T
+    parts, share = np.arange(len(gains)) / len(gains), np.ones(1)
+    for changes in (1.0 + parts, 2.0 - parts):  # in other proportions, which tells factors apart
+        changed = value + STEP * changes * scale
+        content = {path: number for (path, _), number in zip(gains, changed.tolist(), strict=True)}
+        other = model_of(load_content(scene_content(model.scene), content))
+        if not alike_but_gains(model, other, besides):
+            return {}
+        moved = other.drives.law_gain != model.drives.law_gain
+        before, share = share, other.drives.law_gain[:, None] / changed
+        alike = moved[:, None] & (np.abs(share - before) < SAME * np.abs(share))
+        if (alike.sum(axis=1) == moved).all() and alike.any(axis=0).all():
+            return {path: share[:, k] * alike[:, k] for k, (path, _) in enumerate(gains)}
+    return {}

@@ -314,9 +314,7 @@ class RunResponse:
         gains = model.drives.law_gain.copy()
         try:
             if number.gain.any():
-                changed = gains.copy()
-                changed[number.gain > 0.0] = number.value + way
-                put_gains(model, changed)
+                put_gains(model, gains + way * number.gain)
             return values_of(stepper, state, wanted, described(self._description, stepper))
         finally:
             put_gains(model, gains)

@@ -20,6 +20,7 @@ from bilayer_core.model.records.parts import Drives
 from bilayer_core.model.start_motion import set_in_motion
 from bilayer_core.model.state import PARTS, State, turn_directors
 from bilayer_core.observed.frame import Description
+from bilayer_core.simulation.gains import SPACING
 from bilayer_core.simulation.gradients.course import Course
 from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
 from bilayer_core.simulation.gradients.impact_rates import speeds_at_end
@@ -33,7 +34,7 @@ from bilayer_core.simulation.gradients.nearby import (
     slope,
     tangents_of,
 )
-from bilayer_core.simulation.gradients.parameters import STEP, laws_of, numbers_of, scene_with
+from bilayer_core.simulation.gradients.parameters import STEP, numbers_of, scene_with, shares_of
 from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
 from bilayer_core.simulation.same_model import differing
 from bilayer_core.simulation.settling import SETTLE
@@ -74,7 +75,7 @@ class Number:
     path : str
     value, scale : float
     gain : ndarray
-        1 for laws of which it is the gain, shape (n_law,).
+        How many times the gain of each law it is, where it is a gain alone, shape (n_law,).
     first, stimulus : ndarray
         Of stimuli at the start of each step and at its stages, the derivatives by it, shapes (n_step, n_channel),
         (n_step, n_stage, n_channel).
@@ -192,14 +193,15 @@ class VariedNumbers:
                 path = f"stimuli.{name}.schedule"
                 raise InputError(f"gradient: {name} varies in a run; name a number of its schedule, {path}. …")
         paths = {name: list(numbers_of(self.scene, name)) for name in names}
-        laws = laws_of(self.model, self._builders.model_of, [number for of in paths.values() for number in of])
-        return {name: [self._number(path, value, laws.get(path)) for path, value in of] for name, of in paths.items()}
+        numbers = [number for of in paths.values() for number in of]
+        shares = shares_of(self.model, self._builders.model_of, numbers, SPACING)  # as given, like lengths of steps
+        return {name: [self._number(path, value, shares.get(path)) for path, value in of] for name, of in paths.items()}
 
-    def _number(self, path: str, value: float, laws: Array | None) -> Number:
+    def _number(self, path: str, value: float, share: Array | None) -> Number:
         driven, scale = self.driven, abs(value) or min(1.0, self.size * STEP / self.step)
         found = Number(path, value, scale, np.zeros(len(self.here.laws)), 0.0 * driven.first, 0.0 * driven.stimulus)
-        if laws is not None:
-            found.gain[laws] = 1.0
+        if share is not None:
+            found.gain[:] = share
             return found
         scenes = [scene_with(self.scene, {path: value + place * self.step * found.scale}) for place in PLACES]
         if all(not differing(self.scene, scene) for scene in scenes):

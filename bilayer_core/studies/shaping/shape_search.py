@@ -209,7 +209,7 @@ class _Search:
 
     def _are_laws(self) -> bool:
         """Return whether all values are gains, for which nothing is built."""
-        return all(p.laws.size for of in self._parameters for p in of)
+        return all(p.share.size for of in self._parameters for p in of)
 
     def _sought(self, here: Equilibrium, names: Sequence[str] = ()) -> list[Parameter]:
         return [p for of in here.parameters(names or self._names).values() for p in of]
