@@ -35,7 +35,7 @@ def put_gains(model: Model, gains: Array) -> None:
 
 
 def take_gains(model: Model, other: Model) -> None:
-    """Likewise write those of another model, with the `SPACING` that they ask for."""
+    """Write the gains of another model likewise, with the `SPACING` that they ask for."""
     put_gains(model, other.drives.law_gain)
     for name in SPACING:
         _write(getattr(model.surfaces, name), getattr(other.surfaces, name))
