@@ -54,7 +54,7 @@ def _step(z):
 
 
 @kernel
-def _covered_by_edge(light, e, x, toward, soft):
+def covered_by_edge(light, e, x, toward, soft):
     """Return the part of the light from the direction `toward` that edge e hides from x."""
     i = light.edge_node[e]
     a, b = row(light.node_position, i), row(light.node_position, i + 1)
@@ -84,7 +84,7 @@ def _covered_by_edge(light, e, x, toward, soft):
 
 
 @kernel
-def _covered_by_shape(light, s, x, toward, soft):
+def covered_by_shape(light, s, x, toward, soft):
     """Return the part of the light from the direction `toward` that the surface s hides from x."""
     b, kind, rounding = light.body[s], light.kind[s], light.rounding[s]
     p, axes = light.position[s], light.body_rotation
@@ -145,27 +145,40 @@ def _along_ray(kind, size, s, y, v, tau):
 
 
 @kernel
+def face_of(light, k, facing):
+    """Return the middle of the face of element k that is towards its light: it has two if it has no side."""
+    i, m1, up = light.edge_node[light.edge[k]], row(light.director1, light.edge[k]), light.height[k]
+    a, b = row(light.node_position, i), row(light.node_position, i + 1)
+    if light.side[k] == 0.0:
+        up += math.copysign(light.half[k], facing)
+    return 0.5 * (a[0] + b[0]) + up * m1[0], 0.5 * (a[1] + b[1]) + up * m1[1], 0.5 * (a[2] + b[2]) + up * m1[2]
+
+
+@kernel
+def covered(light, e, x, toward):
+    """Return the part of the light that all edges and surfaces hide from a face of edge e, more than 1 if they do so
+    together.
+    """
+    found, soft = 0.0, light.softness[e]
+    for j in range(light.blocker.shape[0]):
+        other = light.blocker[j]
+        if light.section[other] != light.section[e]:
+            found += covered_by_edge(light, other, x, toward, soft)
+    for s in range(light.kind.shape[0]):
+        found += covered_by_shape(light, s, x, toward, soft)
+    return found
+
+
+@kernel
 def look_at_light(light, end):
     """Write n·l without its sign and V of every element, for where nodes, frames and bodies of `light` are, to column
     `end` of `facing` and `visible`.
     """
     edge_geometry(light.node_position, light.edge_node, light.length, light.tangent)
     for k in range(light.edge.shape[0]):
-        e, source, side = light.edge[k], light.source[k], light.side[k]
-        toward, m1 = row(light.direction, source), row(light.director1, e)
-        light.facing[k, end], light.visible[k, end] = dot(m1, toward), 1.0
-        if not light.casts[source]:
-            continue
-        i, up = light.edge_node[e], light.height[k]
-        a, b = row(light.node_position, i), row(light.node_position, i + 1)
-        if side == 0.0:
-            up += math.copysign(light.half[k], light.facing[k, end])
-        x = 0.5 * (a[0] + b[0]) + up * m1[0], 0.5 * (a[1] + b[1]) + up * m1[1], 0.5 * (a[2] + b[2]) + up * m1[2]
-        covered, soft = 0.0, light.softness[e]
-        for j in range(light.blocker.shape[0]):
-            other = light.blocker[j]
-            if light.section[other] != light.section[e]:
-                covered += _covered_by_edge(light, other, x, toward, soft)
-        for s in range(light.kind.shape[0]):
-            covered += _covered_by_shape(light, s, x, toward, soft)
-        light.visible[k, end] = max(0.0, 1.0 - covered)
+        e, source = light.edge[k], light.source[k]
+        toward = row(light.direction, source)
+        light.facing[k, end], light.visible[k, end] = dot(row(light.director1, e), toward), 1.0
+        if light.casts[source]:
+            x = face_of(light, k, light.facing[k, end])
+            light.visible[k, end] = max(0.0, 1.0 - covered(light, e, x, toward))

@@ -7,7 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from bilayer_core.engine import friction_differences, gradient_differences, step_response  # noqa: F401 (declares pieces)
+from bilayer_core.engine import (  # noqa: F401 (declares pieces)
+    friction_differences,
+    gradient_differences,
+    light_differences,
+    step_response,
+)
 from bilayer_core.engine.actuation import Actuation
 from bilayer_core.engine.capacity import CapacityError
 from bilayer_core.engine.energy_account import open_account

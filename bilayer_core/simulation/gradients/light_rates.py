@@ -1,12 +1,10 @@
-"""Derivatives of what elements of layers see of light: at the start of a step, and a time later as it went before.
-
-Where elements face, and what hides them, are differences by each unknown: any edge may hide any other.
-"""
+"""Derivatives of what elements of layers see of light: at the start of a step, and a time later as it went before."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from bilayer_core.engine.light_differences import LightSlopes, differentiate_light
 from bilayer_core.model.lit_elements import shine
 from bilayer_core.model.records.step import Configuration
 from bilayer_core.simulation.gradients.step_again import KeptStep, StepAgain
@@ -25,19 +23,13 @@ def looked_at(again: StepAgain, at: Configuration) -> Array:
     return np.concatenate([light.facing[:, 1], light.visible[:, 1]])
 
 
-def slopes_of_light(again: StepAgain, at: Configuration, free: Array) -> Array:
-    """Return how all that depends on the unknowns that are `free`, shape (2 n_lit, size)."""
-    found, travel = np.zeros((2 * len(again.problem.light.law), again.size)), np.zeros(again.size)
-    change = np.full(again.size, CHANGE)
-    change[again.of_nodes] = change[again.of_bodies[:, :3]] = CHANGE * again.problem.strands.rest_length.min()
-    for j in np.flatnonzero(free):
-        for way in (1.0, -1.0):
-            travel[j] = way * change[j]
-            again.travel(at, travel, again.spare)
-            found[:, j] += way * looked_at(again, again.spare)
-        found[:, j] /= 2.0 * change[j]
-        travel[j] = 0.0
-    return found
+def slopes_of_light(again: StepAgain, at: Configuration) -> Array:
+    """Return how all that depends on unknowns, shape (2 n_lit, size)."""
+    problem, elements = again.problem, len(again.problem.light.law)
+    found = LightSlopes(by_place=np.zeros((2 * elements, again.size)), rotation=np.zeros((1, 3, 3)))
+    looked_at(again, at)
+    differentiate_light(problem, at, found, CHANGE * float(problem.strands.rest_length.min()), CHANGE)
+    return found.by_place
 
 
 def light_rates(again: StepAgain, step: KeptStep) -> Array:

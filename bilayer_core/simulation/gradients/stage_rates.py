@@ -400,4 +400,4 @@ class StageDerivatives:
         """Return how what elements see of light depends on places, shape (2 n_lit, size)."""
         if not again.problem.light.exists:
             return np.zeros((0, self.constants.size))
-        return slopes_of_light(again, at, self.constants.record.free)
+        return slopes_of_light(again, at)
