@@ -1,15 +1,20 @@
 """Patterns that are found from wanted shapes."""
 
 import csv
+import json
 import math
 import re
+import signal
+import subprocess
 
 import numpy as np
 import pytest
 import yaml
+from support.processes import command, environment
 
 from bilayer_core import Simulator, design, load_scene
 from bilayer_core.cli import main
+from bilayer_core.cli.signals import WORDS
 from bilayer_core.errors import InputError, SceneError, SimulationError
 from bilayer_core.studies.shaping.shape_search import _Search
 from bilayer_core.studies.shaping.target_curve import TargetCurve, between, read_curve
@@ -224,6 +229,21 @@ def test_more_pieces_of_a_palette_than_stations_come_nearer_than_few(drawn):
     assert many.rms < 0.2 * few.rms
 
 
+def test_a_palette_beside_thickness_that_varies_comes_no_less_near_than_alone(drawn):
+    alone = [f"{GAIN}=-10%,0,10%:12"]
+    films = [*alone, "rods.strip.layers.active.thickness=0.8mm:1.5mm:4"]
+    few, more = (design("bending", drawn, vary, overrides=HANGING) for vary in (alone, films))
+    assert set(more.values[0]) <= {-0.1, 0.0, 0.1}
+    assert more.rms < few.rms
+
+
+def test_a_search_that_is_stopped_has_a_pattern_of_the_palette(drawn):
+    calls = iter([False, False, True])
+    found = design("bending", drawn, [f"{GAIN}=-5%,0,5%:50"], overrides=HANGING, interrupted=lambda: next(calls))
+    assert found.termination.startswith("stopped") and set(found.values[0]) <= {-0.05, 0.0, 0.05}
+    assert found.rms < 0.05
+
+
 def test_a_layer_takes_the_film_next_to_the_thickness_that_is_best():
     path = "rods.strip.layers.active.thickness"
     found = design("bending", curve_of({path: 1.3e-3}), [f"{path}=1mm,1.25mm,2mm"])
@@ -365,6 +385,28 @@ def test_the_command_writes_scene_pattern_report_and_picture(tmp_path, capsys):
         rows = list(csv.DictReader(file))
     assert [float(row["value"]) for row in rows] == value == pytest.approx(np.linspace(0.0, 0.03, 6), abs=5e-4)
     assert (out / "report.json").exists() and (out / "design.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_search_that_a_signal_stops_writes_the_best_pattern_so_far(tmp_path, number):
+    turn = np.pi * np.clip(np.linspace(-1.0, 2.0, 120), 0.0, 1.0)
+    steps = np.stack([np.cos(turn), 0.0 * turn, np.sin(turn)], axis=1) * LENGTH / 119
+    curve = tmp_path / "curve.csv"
+    np.savetxt(curve, np.cumsum(steps, axis=0), delimiter=",", header="x,y,z", comments="")
+    vary = ["--vary", f"{GAIN}=-10%,0,10%:30", "--vary", "rods.strip.layers.active.thickness=0.5mm:2mm:30"]
+    arguments = command("design", "bending", "--target", str(curve), *vary, "--out", str(tmp_path / "made"))
+    search = subprocess.Popen(arguments, env=environment(), stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    for line in search.stderr:
+        if "rms distance" in line:
+            break
+    search.send_signal(number)
+    out, err = search.communicate(timeout=120)
+    assert search.returncode == 128 + number and err.endswith(f"bilayer: {WORDS[number]}\n")
+    assert "stopped; this is the best pattern so far" in out
+    report = json.loads((tmp_path / "made" / "report.json").read_text())
+    assert report["termination"].startswith("stopped")
+    assert set(report["pattern"][GAIN]["value"]) <= {-0.1, 0.0, 0.1}
+    assert load_scene(tmp_path / "made" / "designed.yaml").rods[0].layers[1].eigenstrain[0].gain.value
 
 
 @pytest.mark.parametrize(

@@ -43,7 +43,7 @@ from bilayer_core.studies.shaping.varied import Varied, Vary, read_varied
 
 Array = np.ndarray
 Target = str | Path | Array
-MOST_STEPS, MOST_TRIALS, MOST_MODELS, MOST_PALETTES = 60, 8, 3, 8
+MOST_STEPS, FEW_STEPS, MOST_TRIALS, MOST_MODELS, MOST_PALETTES = 60, 3, 8, 3, 8
 ENOUGH = 1e-6
 """Root mean square of distances, of the length of the rod, at which to end."""
 STALLED = 0.02
@@ -85,6 +85,7 @@ def design(
     overrides: Overrides = (),
     smoothness: float = SMOOTH,
     progress: Callable[[str], None] | None = None,
+    interrupted: Callable[[], bool] = lambda: False,
 ) -> DesignResult:
     """Find values of a scene with which a rod takes one wanted shape or several.
 
@@ -105,6 +106,8 @@ def design(
         Weight of the roughness of patterns.
     progress : callable, optional
         Called with a line of text for each step.
+    interrupted : callable, optional
+        Called before each equilibrium. The search ends where it returns True; the result is the best pattern so far.
 
     Returns
     -------
@@ -135,7 +138,7 @@ def design(
         raise InputError(f"smoothness: {smoothness} is not allowed; it must be a finite number from 0 up")
     config, varied = read_varied(config, vary)
     config = _in_space(config, varied)
-    return _Search(config, varied, curves, levels, smoothness, progress).result()
+    return _Search(config, varied, curves, levels, smoothness, progress, interrupted).result()
 
 
 def _in_space(scene: SceneConfig, varied: list[Varied]) -> SceneConfig:
@@ -150,6 +153,10 @@ def _in_space(scene: SceneConfig, varied: list[Varied]) -> SceneConfig:
     return scene
 
 
+class _Stopped(Exception):  # noqa: N818 it is no error
+    """The search is to end."""
+
+
 class _Search:
     """Steps from equilibrium to equilibrium."""
 
@@ -161,10 +168,12 @@ class _Search:
         levels: list[dict[str, float]],
         smoothness: float,
         progress: Callable[[str], None] | None,
+        interrupted: Callable[[], bool],
     ):
         self._scene, self._varied, self._levels = scene, varied, levels
-        self._pattern, self._progress = Pattern(varied, smoothness), progress
+        self._pattern, self._progress, self._interrupted = Pattern(varied, smoothness), progress, interrupted
         self._values = np.concatenate([v.start for v in varied])
+        self._moving = np.ones(len(self._values), dtype=bool)
         self._names = [name for v in varied for name in v.names]
         owners = self._pattern.split(np.arange(len(self._values)))
         self._owner = np.concatenate([v.in_scene(own) for v, own in zip(varied, owners, strict=True)])
@@ -283,6 +292,8 @@ class _Search:
 
     def _go(self, values: Array) -> None:
         """Go to the equilibria with other values."""
+        if self._interrupted():
+            raise _Stopped
         self._known = []
         if not self._by_laws or self._here[0].model.scene.gravity != self._gravity:
             self._here = self._built(values, self._here)
@@ -362,7 +373,7 @@ class _Search:
                 return "the shape is as wanted"
             before, now, equations = self._kept(), self._left(targets), self._equations(targets, self._slopes())
             for _ in range(MOST_TRIALS):
-                new = self._left_with(self._pattern.solved(*equations, self._values, damping), targets)
+                new = self._left_with(self._pattern.solved(*equations, self._values, self._moving, damping), targets)
                 if new < now:
                     break
                 self._return_to(before)
@@ -395,25 +406,40 @@ class _Search:
         for here, shape in zip(self._here, shapes, strict=True):
             here.return_to(shape)
 
-    def _take_palettes(self) -> str:
-        """Take values of palettes, from the linear problem about each pattern that was tried."""
+    def _take_palettes(self, most: int) -> str:
+        """Take values of palettes, from the linear problem about each pattern that was tried; others follow."""
         free, best, least, tried = 100.0 * self._rms(self._targets), self._kept(), math.inf, set()
-        for _ in range(MOST_PALETTES):
-            values = self._pattern.printable(*self._equations(self._targets, self._slopes()), self._values)
-            if values.tobytes() in tried:
+        moving, palette = self._moving, self._pattern.in_palette
+        for _ in range(most):
+            equations = self._equations(self._targets, self._slopes())
+            values = self._pattern.printable(*equations, self._values, moving)
+            if values[palette].tobytes() in tried:
                 break
-            tried.add(values.tobytes())
-            left = self._left_with(values, self._targets)
-            if not math.isfinite(left):
+            tried.add(values[palette].tobytes())
+            if not math.isfinite(self._left_with(values, self._targets)):
                 break
+            self._improve_some(moving & ~palette, FEW_STEPS)
             self._tell()
+            left = self._left(self._targets)
             best, least = (self._kept(), left) if left < least else (best, least)
         self._return_to(best)
         if not math.isfinite(least):
             return f"no pattern of the palette has an equilibrium near{self._failure}"
         return f"values of the palette; without it: rms distance {free:.3g} %"
 
+    def _improve_some(self, moving: Array, steps: int) -> None:
+        """Make steps towards targets in which some values alone change."""
+        if moving.any():
+            before, self._moving = self._moving, moving
+            self._improve(self._targets, steps)
+            self._moving = before
+
     def _tell(self) -> None:
+        """Tell how near the rod is, and note the best pattern so far: of palettes, if there are any."""
+        is_free = self._weight < 1.0 or not self._pattern.is_printable(self._values)
+        rank = is_free, self._left(self._targets)
+        if rank < self._best_rank:
+            self._best_rank, self._best = rank, (self._kept(), self._sections)
         if self._progress is not None:
             rms = self._rms(self._targets)
             self._progress(f"{self.equilibria} equilibria: rms distance {100 * rms:.3g} % of the rod")
@@ -424,6 +450,19 @@ class _Search:
         Which sections rods have may follow from the pattern. Beams come first: they have one shape at rest, from which
         wide strips find their own that is near. Where strips have none, the scene keeps the sections of the search.
         """
+        self._best_rank, self._best = (True, math.inf), (self._kept(), self._sections)
+        try:
+            return self._report(*self._searched_with_own_sections())
+        except _Stopped:
+            kept, self._sections = self._best
+            self._return_to(kept)
+            self._interrupted = bool
+            if not self._pattern.is_printable(self._values):
+                self._take_palettes(1)
+            return self._report("stopped; this is the best pattern so far", self._in_sections_of_search())
+
+    def _searched_with_own_sections(self) -> tuple[str, Simulator]:
+        """Search, and return why that ended, and a simulator of the scene that was found."""
         termination = self._search()
         for _ in range(MOST_MODELS):
             simulator = Simulator(self._scene_with(self._values, {}))
@@ -446,7 +485,7 @@ class _Search:
         else:
             termination += "; sections change with the pattern"
             simulator = self._in_sections_of_search()
-        return self._report(termination + self._out_of_reach(), simulator)
+        return termination + self._out_of_reach(), simulator
 
     def _in_sections_of_search(self) -> Simulator:
         """Return a simulator of the scene with the sections of the search."""
@@ -454,6 +493,28 @@ class _Search:
 
     def _search(self) -> str:
         """Go to the best pattern, and return why the search ended there.
+
+        Values of palettes are chosen from a linear problem, in which they may come out worse beside others that vary
+        than alone. So they are sought alone as well, before the others follow.
+        """
+        start, palette, every = self._kept(), self._pattern.in_palette, self._moving
+        ended = self._searched()
+        if palette.all() or not palette.any():
+            return ended
+        best, least = self._kept(), self._left(self._targets)
+        self._return_to(start)
+        with contextlib.suppress(SimulationError):
+            self._moving = palette
+            self._searched()
+            self._improve_some(~palette, FEW_STEPS)
+        self._moving = every
+        if not self._left(self._targets) < least:
+            self._return_to(best)
+        self._improve_some(~palette, MOST_STEPS)
+        return ended
+
+    def _searched(self) -> str:
+        """Go to the best pattern by the values that may change, and return why the search ended there.
 
         If the direct way leads astray, another goes through shapes between without weight, which then comes back.
         """
@@ -527,7 +588,7 @@ class _Search:
             pull = equations(targets, slopes)[0] @ list(sizes.values()) * (weight - self._weight)
             self._weight, self._known = weight, []
         rows, right = equations(targets, self._slopes())
-        values = self._pattern.solved(rows, right + pull, self._values, 0.0)
+        values = self._pattern.solved(rows, right + pull, self._values, self._moving, 0.0)
         wanted = right + pull + rows @ (values - self._values)
         if not math.isfinite(self._left_with(values, targets)):
             return False
@@ -537,7 +598,7 @@ class _Search:
     def _found(self) -> str:
         """Go to the best pattern that is near, and return why the search ended there."""
         ended = self._improve(self._targets, MOST_STEPS)
-        return self._take_palettes() if self._pattern.has_palette else ended
+        return self._take_palettes(MOST_PALETTES) if self._pattern.in_palette.any() else ended
 
     def _refuse_idle(self) -> None:
         moved = np.max([np.abs(slopes).max(axis=(0, 1)) for slopes in self._slopes()], axis=0)
