@@ -197,6 +197,22 @@ def test_all_arms_of_a_swimmer_get_the_pattern_of_the_first_on_a_floating_hub():
     assert "of arm_0, the first of 8 copies, from the target" in str(found)
 
 
+def test_a_curve_turns_with_the_body_that_holds_the_rod():
+    hinge = {"type": "guided", "hinge": [0, 1, 0], "turning": {"spring": 2.5e-3}}
+    sprung = HANGING | {"bodies": [{"name": "wall", "position": [0, 0, 0], "motion": hinge}]}
+    profile = {"at": [0, 0.05, 0.1], "value": [0.01, -0.02, 0.03]}
+    simulator = Simulator(load_scene("bending", sprung | {GAIN: profile}))
+    simulator.set_stimulus("swelling", 1.0)
+    simulator.solve_static()
+    curve, turned = simulator.positions, simulator._now.body_rotation[0]
+    assert math.acos(turned[0, 0]) > math.radians(15.0)
+    wanted = curve @ turned  # as the wall sees it
+    found = design("bending", wanted, {GAIN: (-0.05, 0.05, 3)}, overrides=sprung)
+    assert found.values[0] == pytest.approx(profile["value"], abs=1e-4)
+    assert found.largest < 1e-4 and found.equilibria <= 10
+    assert np.abs(found.shapes[0].target.points - curve).max() < 1e-3 * LENGTH  # drawn where the rod is
+
+
 def test_the_first_rod_that_a_path_names_is_shaped():
     along, across = (f"rods.{name}.layers.active.eigenstrain.gain" for name in ("along", "across"))
     wanted = curve_of({along: 0.004}, 1.0, "films", "humidity", "along")

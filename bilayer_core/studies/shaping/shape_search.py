@@ -231,6 +231,7 @@ class _Search:
             raise InputError(
                 f"rods.{rod.name}: wanted curves begin where the rod does, which nothing holds: clamp_start"
             )
+        self._holder = [body.name for body in self._scene.bodies].index(rod.clamp_start)
         found = [slice(s.first_node, s.first_node + s.shown) for s in strands if s.rod == name]
         return found if len({s.stop - s.start for s in found}) == 1 else found[:1]
 
@@ -238,15 +239,24 @@ class _Search:
         """Return what the curve of the rod has, of what nodes have."""
         return np.mean([of_nodes[nodes] for nodes in self._nodes], axis=0)
 
-    def _curve(self, here: Equilibrium | Simulator) -> Array:
-        """Return the curve of the rod from its start, which a body that floats may hold [m], shape (n, 3)."""
+    def _turned(self, here: Equilibrium) -> Array:
+        """Return the rotation since the start of the body that holds the rod, shape (3, 3)."""
+        return here.rotations[self._holder] @ here.model.bodies.start_rotation[self._holder].T
+
+    def _curve(self, here: Equilibrium) -> Array:
+        """Return the curve of the rod from its start, as the body sees it that holds it there [m], shape (n, 3)."""
+        return self._from_start(here) @ self._turned(here)
+
+    def _from_start(self, here: Equilibrium | Simulator) -> Array:
         points = self._of_rod(here.positions)
         return points - points[0]
 
     def _derivatives(self, here: Equilibrium, parameters: list[Parameter]) -> Array:
         """Return its derivatives, shape (n, 3, n_parameter)."""
-        velocities = self._of_rod(here.velocities(parameters))
-        return velocities - velocities[0]
+        of_nodes, of_bodies = here.velocities(parameters)
+        velocities = self._of_rod(of_nodes)
+        turning = np.cross(of_bodies[self._holder][None], self._from_start(here)[..., None], axis=1)
+        return np.einsum("iak,ab->ibk", velocities - velocities[0] - turning, self._turned(here))
 
     def _slopes(self) -> list[Array]:
         """Return its derivatives by the values at each level, computed once for each equilibrium."""
@@ -626,7 +636,7 @@ class _Search:
             self._targets, self._levels, self._here, self._departures(self._targets), strict=True
         ):
             made = self._of_rod(here.positions)
-            target = TargetCurve(target.points + made[0], target.source)
+            target = TargetCurve(target.points @ self._turned(here).T + made[0], target.source)
             length = float(np.linalg.norm(np.diff(made, axis=0), axis=1).sum())
             stable, reached = self._is_stable(simulator, here), self._is_reached(simulator, here, level)
             shapes.append(Shape(target, level, made, np.linalg.norm(away, axis=1), length, stable, reached))
@@ -659,7 +669,7 @@ class _Search:
         return False
 
     def _is_at(self, simulator: Simulator, here: Equilibrium) -> bool:
-        return bool(np.abs(self._curve(simulator) - self._curve(here)).max() <= CLOSE * self._size)
+        return bool(np.abs(self._from_start(simulator) - self._from_start(here)).max() <= CLOSE * self._size)
 
     def _sensitivity(self) -> dict[str, float]:
         """Return the largest displacements by errors of 1 % in each pattern, and in the thickness of each layer [m]."""
