@@ -16,7 +16,7 @@ from bilayer_core import Simulator, design, load_scene
 from bilayer_core.cli import main
 from bilayer_core.cli.signals import WORDS
 from bilayer_core.errors import InputError, SceneError, SimulationError
-from bilayer_core.studies.shaping.shape_search import _Search
+from bilayer_core.studies.shaping.shaped_rod import ShapedRod
 from bilayer_core.studies.shaping.target_curve import TargetCurve, between, read_curve
 
 GAIN = "rods.strip.layers.active.eigenstrain.gain"
@@ -100,14 +100,14 @@ def test_the_report_says_whether_the_rod_comes_to_its_shape_from_the_start_of_th
 
 
 def test_what_was_found_is_kept_where_the_sections_of_the_pattern_have_no_equilibrium(monkeypatch):
-    built = _Search._built
+    built = ShapedRod.built
 
     def folding(self, *what):
-        if "strip" in self._sections.values():
+        if "strip" in self.sections.values():
             raise SimulationError("folds", 0.0)
         return built(self, *what)
 
-    monkeypatch.setattr(_Search, "_built", folding)
+    monkeypatch.setattr(ShapedRod, "built", folding)
     found = film(**{"rods.strip.width": 20e-3})
     assert "no equilibrium is near with its own sections (rods.strip.section: strip" in found.termination
     assert found.rms < 2e-4 and found.shapes[0].stable and found.scene.rods[0].section == "beam"
