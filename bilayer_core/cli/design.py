@@ -5,8 +5,9 @@ from __future__ import annotations
 import click
 
 from bilayer_core.cli.options import Verb, output_directory, scene_argument, set_option
+from bilayer_core.cli.signals import Interruption
 from bilayer_core.cli.terminal import say
-from bilayer_core.cli.watch import compile_kernels
+from bilayer_core.cli.watch import Interrupt, compile_kernels
 from bilayer_core.errors import InputError
 
 
@@ -45,7 +46,8 @@ def design(
 ) -> int:
     """Find the pattern with which SCENE takes wanted shapes.
 
-    The curve of a rod, clamped where it begins, comes as near to each target as the bounds of the pattern allow.
+    The curve of a rod, clamped where it begins, comes as near to each target as the bounds of the pattern allow. A
+    search that is interrupted writes the best pattern so far.
     """
     from bilayer_core.studies.shaping import design_files
     from bilayer_core.studies.shaping.shape_search import SMOOTH
@@ -62,18 +64,22 @@ def design(
     for path in targets:
         read_curve(path)  # refused before kernels compile
     compile_kernels(quiet)
-    found = find_design(
-        scene,
-        list(targets),
-        vary,
-        at=at,
-        overrides=overrides,
-        smoothness=SMOOTH if smoothness is None else smoothness,
-        progress=None if quiet else _tell,
-    )
+    with Interrupt() as interrupt:
+        found = find_design(
+            scene,
+            list(targets),
+            vary,
+            at=at,
+            overrides=overrides,
+            smoothness=SMOOTH if smoothness is None else smoothness,
+            progress=None if quiet else _tell,
+            interrupted=interrupt.grant,
+        )
     say(str(found))
     for path in () if directory is None else design_files.write_files(found, directory, force):
         say(f"wrote {path}")
+    if interrupt.granted:
+        raise Interruption(interrupt.wished)
     return 0
 
 

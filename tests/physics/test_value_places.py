@@ -58,9 +58,9 @@ def columns(scene, overrides, path, stimuli, value, count=16, inner=slice(None))
     made = here._builders.model_of
     here._builders = replace(here._builders, model_of=lambda scene: models.append(scene) or made(scene))
     parameters = here.parameters([f"{path}.value"])[f"{path}.value"][inner]
-    alone = np.concatenate([here.velocities([parameter]) for parameter in parameters], axis=-1)
+    alone = np.concatenate([here.velocities([parameter])[0] for parameter in parameters], axis=-1)
     models.clear()
-    together = here.velocities(parameters)
+    together = here.velocities(parameters)[0]
     return together - together[:1], alone - alone[:1], len(models)
 
 

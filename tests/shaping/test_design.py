@@ -1,17 +1,22 @@
 """Patterns that are found from wanted shapes."""
 
 import csv
+import json
 import math
 import re
+import signal
+import subprocess
 
 import numpy as np
 import pytest
 import yaml
+from support.processes import command, environment
 
 from bilayer_core import Simulator, design, load_scene
 from bilayer_core.cli import main
+from bilayer_core.cli.signals import WORDS
 from bilayer_core.errors import InputError, SceneError, SimulationError
-from bilayer_core.studies.shaping.shape_search import _Search
+from bilayer_core.studies.shaping.shaped_rod import ShapedRod
 from bilayer_core.studies.shaping.target_curve import TargetCurve, between, read_curve
 
 GAIN = "rods.strip.layers.active.eigenstrain.gain"
@@ -95,14 +100,14 @@ def test_the_report_says_whether_the_rod_comes_to_its_shape_from_the_start_of_th
 
 
 def test_what_was_found_is_kept_where_the_sections_of_the_pattern_have_no_equilibrium(monkeypatch):
-    built = _Search._built
+    built = ShapedRod.built
 
     def folding(self, *what):
-        if "strip" in self._sections.values():
+        if "strip" in self.sections.values():
             raise SimulationError("folds", 0.0)
         return built(self, *what)
 
-    monkeypatch.setattr(_Search, "_built", folding)
+    monkeypatch.setattr(ShapedRod, "built", folding)
     found = film(**{"rods.strip.width": 20e-3})
     assert "no equilibrium is near with its own sections (rods.strip.section: strip" in found.termination
     assert found.rms < 2e-4 and found.shapes[0].stable and found.scene.rods[0].section == "beam"
@@ -192,6 +197,22 @@ def test_all_arms_of_a_swimmer_get_the_pattern_of_the_first_on_a_floating_hub():
     assert "of arm_0, the first of 8 copies, from the target" in str(found)
 
 
+def test_a_curve_turns_with_the_body_that_holds_the_rod():
+    hinge = {"type": "guided", "hinge": [0, 1, 0], "turning": {"spring": 2.5e-3}}
+    sprung = HANGING | {"bodies": [{"name": "wall", "position": [0, 0, 0], "motion": hinge}]}
+    profile = {"at": [0, 0.05, 0.1], "value": [0.01, -0.02, 0.03]}
+    simulator = Simulator(load_scene("bending", sprung | {GAIN: profile}))
+    simulator.set_stimulus("swelling", 1.0)
+    simulator.solve_static()
+    curve, turned = simulator.positions, simulator._now.body_rotation[0]
+    assert math.acos(turned[0, 0]) > math.radians(15.0)
+    wanted = curve @ turned  # as the wall sees it
+    found = design("bending", wanted, {GAIN: (-0.05, 0.05, 3)}, overrides=sprung)
+    assert found.values[0] == pytest.approx(profile["value"], abs=1e-4)
+    assert found.largest < 1e-4 and found.equilibria <= 10
+    assert np.abs(found.shapes[0].target.points - curve).max() < 1e-3 * LENGTH  # drawn where the rod is
+
+
 def test_the_first_rod_that_a_path_names_is_shaped():
     along, across = (f"rods.{name}.layers.active.eigenstrain.gain" for name in ("along", "across"))
     wanted = curve_of({along: 0.004}, 1.0, "films", "humidity", "along")
@@ -222,6 +243,21 @@ def test_pieces_of_two_materials_come_near_a_shape_that_needs_others(drawn):
 def test_more_pieces_of_a_palette_than_stations_come_nearer_than_few(drawn):
     few, many = (design("bending", drawn, [f"{GAIN}=-5%,0,5%:{pieces}"], overrides=HANGING) for pieces in (20, 100))
     assert many.rms < 0.2 * few.rms
+
+
+def test_a_palette_beside_thickness_that_varies_comes_no_less_near_than_alone(drawn):
+    alone = [f"{GAIN}=-10%,0,10%:12"]
+    films = [*alone, "rods.strip.layers.active.thickness=0.8mm:1.5mm:4"]
+    few, more = (design("bending", drawn, vary, overrides=HANGING) for vary in (alone, films))
+    assert set(more.values[0]) <= {-0.1, 0.0, 0.1}
+    assert more.rms < few.rms
+
+
+def test_a_search_that_is_stopped_has_a_pattern_of_the_palette(drawn):
+    calls = iter([False, False, True])
+    found = design("bending", drawn, [f"{GAIN}=-5%,0,5%:50"], overrides=HANGING, interrupted=lambda: next(calls))
+    assert found.termination.startswith("stopped") and set(found.values[0]) <= {-0.05, 0.0, 0.05}
+    assert found.rms < 0.05
 
 
 def test_a_layer_takes_the_film_next_to_the_thickness_that_is_best():
@@ -365,6 +401,28 @@ def test_the_command_writes_scene_pattern_report_and_picture(tmp_path, capsys):
         rows = list(csv.DictReader(file))
     assert [float(row["value"]) for row in rows] == value == pytest.approx(np.linspace(0.0, 0.03, 6), abs=5e-4)
     assert (out / "report.json").exists() and (out / "design.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_search_that_a_signal_stops_writes_the_best_pattern_so_far(tmp_path, number):
+    turn = np.pi * np.clip(np.linspace(-1.0, 2.0, 120), 0.0, 1.0)
+    steps = np.stack([np.cos(turn), 0.0 * turn, np.sin(turn)], axis=1) * LENGTH / 119
+    curve = tmp_path / "curve.csv"
+    np.savetxt(curve, np.cumsum(steps, axis=0), delimiter=",", header="x,y,z", comments="")
+    vary = ["--vary", f"{GAIN}=-10%,0,10%:30", "--vary", "rods.strip.layers.active.thickness=0.5mm:2mm:30"]
+    arguments = command("design", "bending", "--target", str(curve), *vary, "--out", str(tmp_path / "made"))
+    search = subprocess.Popen(arguments, env=environment(), stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    for line in search.stderr:
+        if "rms distance" in line:
+            break
+    search.send_signal(number)
+    out, err = search.communicate(timeout=120)
+    assert search.returncode == 128 + number and err.endswith(f"bilayer: {WORDS[number]}\n")
+    assert "stopped; this is the best pattern so far" in out
+    report = json.loads((tmp_path / "made" / "report.json").read_text())
+    assert report["termination"].startswith("stopped")
+    assert set(report["pattern"][GAIN]["value"]) <= {-0.1, 0.0, 0.1}
+    assert load_scene(tmp_path / "made" / "designed.yaml").rods[0].layers[1].eigenstrain[0].gain.value
 
 
 @pytest.mark.parametrize(

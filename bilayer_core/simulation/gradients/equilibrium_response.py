@@ -170,6 +170,11 @@ class Equilibrium:
         return self._state.position
 
     @property
+    def rotations(self) -> Array:
+        """Rotations of bodies, shape (n_body, 3, 3)."""
+        return self._state.body_rotation
+
+    @property
     def scene(self) -> SceneConfig:
         if self._changes:
             self._scene, self._changes = load_content(scene_content(self._scene), self._changes), {}
@@ -216,16 +221,18 @@ class Equilibrium:
         self._gains[:], self._scene, self._changes, self._state = *kept[:3], kept[3].copy()
         self._settle()
 
-    def velocities(self, parameters: Sequence[Parameter]) -> Array:
-        """Return dx/dp of nodes by each parameter from one difference each: exact where forces are linear in it, as in
-        gains, else to 1e-5; shape (n_node, 3, n_parameter).
+    def velocities(self, parameters: Sequence[Parameter]) -> tuple[Array, Array]:
+        """Return dx/dp of nodes and dφ/dp of bodies by each parameter from one difference each: exact where forces are
+        linear in it, as in gains, else to 1e-5; shapes (n_node, 3, n_parameter) and (n_body, 3, n_parameter).
         """
         here, found = self._here(self._stimulus, self._gains), np.zeros((*self.positions.shape, len(parameters)))
+        turns, free = np.zeros((len(self.rotations), 3, len(parameters))), self._evaluator.problem.bodies.body_of_free
         gradient, places = here.gradient(here.state), self.model.layout.node[:, None] + np.arange(3)
         gains = here.gradients_by_gains()
 
         def note(k: int, h: float, change: Motion, shift: Array | float = 0.0) -> None:
-            found[..., k] = self._solved(change * (1.0 / h)).unknowns[places] + shift / h
+            motion = self._solved(change * (1.0 / h))
+            found[..., k], turns[free, :, k] = motion.unknowns[places] + shift / h, motion.bodies[:, 3:]
 
         for k, parameter in enumerate(parameters):
             if parameter.share.size:
@@ -237,7 +244,7 @@ class Equilibrium:
         for k, of in zip(numbers, self._differences(others, gradient), strict=True):
             note(k, SMALL * parameters[k].scale, *of)
         put_gains(self.model, self._gains)
-        return found
+        return found, turns
 
     def _differences(self, parameters: Sequence[Parameter], gradient: Motion) -> list[tuple[Motion, Array]]:
         """Return how the gradient and the positions differ in models with each of some parameters changed a little,

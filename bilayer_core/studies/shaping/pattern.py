@@ -41,8 +41,8 @@ class Pattern:
     ----------
     low, high : ndarray
         Bounds of values, shape (n_value,).
-    has_palette : bool
-        Whether some values are those of palettes.
+    in_palette : ndarray of bool
+        Which values are those of palettes, shape (n_value,).
     """
 
     def __init__(self, varied: Sequence[Varied], smoothness: float):
@@ -51,7 +51,7 @@ class Pattern:
         self.high = np.repeat([v.high for v in varied], counts)
         self._begins = np.cumsum(counts)[:-1]
         self._palettes = [v.palette for v in varied for _ in v.start]
-        self.has_palette = any(self._palettes)
+        self.in_palette = np.array([bool(palette) for palette in self._palettes])
         begin, rough = 0, [np.zeros((0, len(self.low)))]
         for v, count in zip(varied, counts, strict=True):
             part = np.zeros((max(count - 2, 0), len(self.low)))
@@ -69,11 +69,15 @@ class Pattern:
         """Return values as parts of the way between their bounds."""
         return (values - self.low) / (self.high - self.low)
 
+    def is_printable(self, values: Array) -> bool:
+        """Return whether values with a palette are of their palettes."""
+        return all(not palette or value in palette for palette, value in zip(self._palettes, values, strict=True))
+
     def roughness(self, values: Array) -> float:
         """Return the sum of squares that is added to those of equations."""
         return float(((self._rough @ self.parts(values)) ** 2).sum())
 
-    def solved(self, rows: Array, right: Array, now: Array, damping: float) -> Array:
+    def solved(self, rows: Array, right: Array, now: Array, moving: Array, damping: float) -> Array:
         """Return the values v that minimise the squares of linear equations and the roughness, within their bounds.
 
         Parameters
@@ -81,31 +85,37 @@ class Pattern:
         rows, right : ndarray
             Equations rows · (v − now) + right = 0, shapes (n, n_value) and (n,).
         now : ndarray
+        moving : ndarray of bool
+            Which values may change, shape (n_value,).
         damping : float
             Weight of staying there.
         """
-        q, r = np.linalg.qr(self._matrix(rows, damping))
-        wanted = q.T @ self._wanted(rows, right, now, damping)
+        matrix, wanted, part = *self._problem(rows, right, now, damping), self.parts(now)
+        q, r = np.linalg.qr(matrix[:, moving])
+        wanted = q.T @ (wanted - matrix[:, ~moving] @ part[~moving])
         found = lstsq(r, wanted)[0]
         if not ((found >= 0.0) & (found <= 1.0)).all():
             found = lsq_linear(r, wanted, bounds=(0.0, 1.0), tol=1e-12).x
-        return self.low + (self.high - self.low) * np.clip(found, 0.0, 1.0)
+        part[moving] = np.clip(found, 0.0, 1.0)
+        return np.where(moving, self._at(part), now)
 
-    def printable(self, rows: Array, right: Array, now: Array) -> Array:
+    def printable(self, rows: Array, right: Array, now: Array, moving: Array) -> Array:
         """Return values likewise, those with a palette of their palettes."""
-        matrix, wanted = self._matrix(rows, FAINT), self._wanted(rows, right, now, FAINT)
-        chosen = [k for k, palette in enumerate(self._palettes) if palette]
+        matrix, wanted, part = *self._problem(rows, right, now, FAINT), self.parts(now)
+        chosen, free = (np.flatnonzero(moving & of).tolist() for of in (self.in_palette, ~self.in_palette))
         choices = {k: (np.array(self._palettes[k]) - self.low[k]) / (self.high[k] - self.low[k]) for k in chosen}
-        free = [k for k, palette in enumerate(self._palettes) if not palette]
         order = free + chosen[::-1]
         q, r = np.linalg.qr(matrix[:, order])
-        found, turned = np.zeros(len(order)), q.T @ wanted
+        turned = q.T @ (wanted - matrix[:, ~moving] @ part[~moving])
         for place in reversed(range(len(order))):
             k = order[place]
-            best = (turned[place] - r[place, place + 1 :] @ found[order[place + 1 :]]) / r[place, place]
-            found[k] = choices[k][np.argmin(np.abs(choices[k] - best))] if k in choices else np.clip(best, 0.0, 1.0)
-        self._change_together(matrix, matrix @ found - wanted, found, choices)
-        return self.low + (self.high - self.low) * found
+            best = (turned[place] - r[place, place + 1 :] @ part[order[place + 1 :]]) / r[place, place]
+            part[k] = choices[k][np.argmin(np.abs(choices[k] - best))] if k in choices else np.clip(best, 0.0, 1.0)
+        self._change_together(matrix, matrix @ part - wanted, part, choices)
+        values = np.where(moving, self._at(part), now)
+        for k in chosen:
+            values[k] = self._palettes[k][np.argmin(np.abs(choices[k] - part[k]))]
+        return values
 
     def _change_together(self, matrix: Array, left: Array, found: Array, choices: dict[int, Array]) -> None:
         """Let neighbours have other values of their palettes as long as the squares of what is left get smaller."""
@@ -121,12 +131,13 @@ class Pattern:
             if left @ left >= (1.0 - 1e-9) * before:
                 break
 
-    def _matrix(self, rows: Array, damping: float) -> Array:
-        count = len(self.low)
-        held = damping * np.eye(count if damping else 0, count)
-        return np.concatenate([rows * (self.high - self.low), self._rough, held])
+    def _at(self, part: Array) -> Array:
+        return self.low + (self.high - self.low) * part
 
-    def _wanted(self, rows: Array, right: Array, now: Array, damping: float) -> Array:
-        part = self.parts(now)
-        held = damping * part if damping else np.zeros(0)
-        return np.concatenate([rows @ ((self.high - self.low) * part) - right, np.zeros(len(self._rough)), held])
+    def _problem(self, rows: Array, right: Array, now: Array, damping: float) -> tuple[Array, Array]:
+        """Return the matrix and the right side of equations for parts of the way between bounds."""
+        count, part = len(self.low), self.parts(now)
+        held = damping * np.eye(count if damping else 0, count)
+        rows = rows * (self.high - self.low)
+        wanted = [rows @ part - right, np.zeros(len(self._rough)), held @ part]
+        return np.concatenate([rows, self._rough, held]), np.concatenate(wanted)
