@@ -416,6 +416,8 @@ def test_a_run_that_begins_elsewhere_begins_there_whatever_the_numbers_are():
     ("name", "overrides", "to", "told"),
     [
         ("bending", IN_WATER | HEAVY | MIDPOINT, THICKNESS, "makes layers unlike"),
+        ("bending", RESTS | {"bodies.wall.motion": FREE}, GAIN, "a robot that floats at its start"),
+        ("crawling_inchworm", SPACE, "rods.body.layers.active.interval.1", "changes how many unknowns"),
         ("bending", {}, "swelling", "a number of its schedule"),
         ("bending", {}, "contact.stiffness", "contact"),
         ("bending", {}, "rods.strip.path.start.1", "turns or moves the plane"),

@@ -218,6 +218,9 @@ class VariedNumbers:
             found.agains = [self.again(model, of) for model, of in zip(models, around, strict=True)]
         else:
             found.agains, found.own = [self.again(self._builders.model_of(scene)) for scene in scenes], True
+            sizes = {(of.size, of.model.node_count, of.end_rates.size) for of in found.agains}
+            if len(sizes) > 1 or sizes.pop()[:2] != (self.here.size, self.model.node_count):
+                raise InputError(f"gradient: {path} changes how many unknowns the model has")
             raised = [of.problem.raised.edge for of in (found.agains[0], self.here)]
             if found.agains[0].end_rates.size != self.here.end_rates.size or not np.array_equal(*raised):
                 rates = self._first_rates(found)
@@ -230,10 +233,6 @@ class VariedNumbers:
                 found.rates = [(of, more) for of in rates]
         for again in found.agains:
             refuse_other_plane(self.model, again.model, path, moves=False)
-        if any(
-            again.size != self.here.size or again.model.node_count != self.model.node_count for again in found.agains
-        ):
-            raise InputError(f"gradient: {path} changes how many unknowns the model has")
         shift, most = self._shift(found), SHIFT * self.here.problem.strands.rest_length.min()
         return found if shift <= most else self._number(path, value, laws, 0.5 * part * most / shift)
 
@@ -321,6 +320,11 @@ class VariedNumbers:
         """Return a step of a number, and the states from which runs begin with it at `PLACES`."""
         rest = Equilibrium(self._stepper, self._course.start, self._builders, self._description)
         response = rest.respond(rest.parameters([number.path])[number.path][0])
+        if response.moves and rest.floats:
+            raise InputError(
+                f"gradient: a robot that floats at its start turns as it settles, and how far {number.path} turns it "
+                "has no derivative; hold it, or leave out `start: settle`"
+            )
         states = []
         for near, place in zip(response.nearby, PLACES, strict=True):
             states.append(near.moved(response.motion * (place * response.h)))
