@@ -61,7 +61,7 @@ OF_GAP = 1e-2
 CONVERGED, GOOD, MOST = 1e-9, 1e-4, 20
 """Of the largest part of dq/dp: the correction that ends them, and the largest last one; how many there may be."""
 FREELY = 1e-6
-"""Part of the motion of a free rod under a couple from which on nothing holds a robot: less than 1 rad/s in all ways."""
+"""Part of the motion of a free rod under a couple from which on nothing holds a robot: all its turns below 1 rad/s."""
 NOTHING = 1e-14
 """Of the longest rod, or of a quantity: change over h that is rounding."""
 RATES = ("velocity", "spin", "strain_rate", "body_velocity", "body_angular_velocity", "has_history", "light_rate")
