@@ -86,6 +86,9 @@ DRIES = {"materials.tissue.retardation_time": 0.01, "rods.valve.layers.outer.int
 OF_TIP = {"drag": {"coefficient": 0.5, "area": 1e-3}}
 DRAGGED = {"bodies": [WALL, AT_TIP["bodies"][1] | OF_TIP], "fluid": WATER | {"added_mass": True}}
 SPUN = HANGING | SPACE | MIDPOINT | {"bodies.wall.motion": SPINNING, LAG: 0.05}
+ON_A_BODY = {"bodies.wall.motion": SPINNING, "gravity": [0.3, 0, -9.81], "solver.model": "laminate"}
+COILED = SPACE | {"bodies.wall.motion": SPINNING, "solver.dt": 0.004, "solver.tolerance": None}
+COILED |= {"solver.integrator": "sdirk2"}
 SPUN_FAST = HANGING | SPACE | {"bodies.wall.motion": SPINNING | {"angular_velocity": [50.0, 5.0, -4.0]}}
 OFF_CURVE = HANGING | {THICKNESS: 1.5e-4, DENSITY: 2000.0}
 PUSHED_OFF = OFF_CURVE | SPACE | {"loads": [JET], "solver.integrator": "sdirk2"}
@@ -156,6 +159,8 @@ CASES = {
         0.03,
         [GAIN, LENGTH, "bodies.wall.motion.inertia.1"],
     ),
+    "a rod that a body holds elsewhere": ("helical_ribbon", ON_A_BODY, 0.003, ["rods.ribbon.path.start.2"]),
+    "a coil that turns a body": ("awn", COILED, 0.004, ["rods.awn.path.start.0"]),
     "layers that become unlike on a body that spins": ("bending", SPUN_FAST, 0.01, [MODULUS, DENSITY]),
     "the implicit midpoint rule": ("bending", SPUN, 0.03, [GAIN, LAG, LENGTH, "bodies.wall.motion.inertia.1"]),
     "a moment": ("bending", AT_TIP | {"loads": [TWIST]}, 0.03, [GAIN, "loads.0.moment.1"]),
@@ -419,6 +424,8 @@ def test_a_run_that_begins_elsewhere_begins_there_whatever_the_numbers_are():
     ("name", "overrides", "to", "told"),
     [
         ("bending", IN_WATER | HEAVY | MIDPOINT, THICKNESS, "makes layers unlike"),
+        ("bending", RESTS | {"bodies.wall.motion": FREE}, GAIN, "a robot that floats at its start"),
+        ("crawling_inchworm", SPACE, "rods.body.layers.active.interval.1", "changes how many unknowns"),
         ("bending", {}, "swelling", "a number of its schedule"),
         ("bending", {}, "contact.stiffness", "contact"),
         ("bending", {}, "rods.strip.path.start.1", "turns or moves the plane"),

@@ -34,6 +34,7 @@ from bilayer_core.scene.loader import load_content, scene_content
 from bilayer_core.simulation.equilibrium import solve_static
 from bilayer_core.simulation.gains import put_gains
 from bilayer_core.simulation.gradients.nearby import (
+    LENGTH,
     PLACES,
     Builders,
     Motion,
@@ -62,6 +63,8 @@ OF_GAP = 1e-2
 """Largest displacement over a step of a parameter, of the smallest gap: barriers are steep."""
 CONVERGED, GOOD, MOST = 1e-9, 1e-4, 20
 """Of the largest part of dq/dp: the correction that ends them, and the largest last one; how many there may be."""
+FREELY = 1e-6
+"""Part of the motion of a free rod under a couple from which on nothing holds a robot: all its turns below 1 rad/s."""
 NOTHING = 1e-14
 """Of the longest rod, or of a quantity: change over h that is rounding."""
 RATES = ("velocity", "spin", "strain_rate", "body_velocity", "body_angular_velocity", "has_history", "light_rate")
@@ -163,6 +166,19 @@ class Equilibrium:
     def known(self) -> Collection[str]:
         """Names of quantities that may be differentiated."""
         return known_quantities(self._stepper, self._state, self._description)
+
+    @property
+    def floats(self) -> bool:
+        """True if nothing keeps the robot from turning."""
+        mass, position = self.model.rods.node_mass[:, None], self._state.position
+        arm = position - (mass * position).sum(axis=0) / mass.sum()
+        places, here = self.model.layout.node[:, None] + np.arange(3), self._here(self._stimulus, self._gains)
+        for axis in [self.model.plane.normal] if self.model.plane.exists else np.eye(3):
+            push = here.gradient(here.state) * 0.0
+            push.unknowns[places] = mass * np.cross(axis, arm)
+            if self.displacement(self._solved(push)) < FREELY * LENGTH**2 * np.abs(arm).max():
+                return False
+        return True
 
     @property
     def positions(self) -> Array:

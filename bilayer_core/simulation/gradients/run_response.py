@@ -274,7 +274,7 @@ class RunResponse:
         moved = np.abs(along.place[self._here.of_nodes, k]).max(initial=0.0)
         turned = self._size * np.abs(along.place[self._here.of_edges, k]).max(initial=0.0)
         largest = max(float(moved), float(turned))
-        h = self._varied.step * number.scale
+        h = number.h
         if largest > 0.0:
             h = min(h, STEP * self._size / largest)
         rows = [self._values_at(number, along, k, place * h, wanted) for place in PLACES]

@@ -425,14 +425,18 @@ class StepAgain(Evaluator):
             if not moved > max(ENOUGH * self._size, self._tolerance * self.stage.length):
                 break
             move(self.problem, at, 1.0, self.stage, self.spare)
-            self.places[n + 1], self.spare = self.spare, at
-            self.follow(self.places[n + 1])
+            self._reach(n, self.spare)
+            self.go(n, reached)  # in one way from the guess: turns depend on ways
         if not written:
             write_maps(self, n)
-        at = self.places[n + 1]
+        self._reach(n, self.places[n + 1])
+        return reached, moved
+
+    def _reach(self, n: int, at: Configuration) -> None:
+        """Write where stage n ends at a configuration."""
+        reached = self.reached
         reached.position[:], reached.turn[:] = at.position, at.total_angle - self.guesses[n].total_angle
         reached.body_position[:], reached.body_rotation[:] = at.body_position, at.body_rotation
-        return reached, moved
 
     def _factorise_end(self, at: Configuration) -> None:
         """Factorise the Hessian at a configuration, and leave the gradient there."""

@@ -42,6 +42,8 @@ from bilayer_core.simulation.stepper import Stepper
 from bilayer_core.simulation.surroundings import Surroundings
 
 Array = np.ndarray
+SHIFT = 1e-4
+"""Of the shortest edge: by how much a number may move nodes that bodies hold beside others, for differences."""
 LOST = 1e-9
 """Part of a rate that is lost by rounding."""
 NEAR = 1e-5
@@ -73,7 +75,8 @@ class Number:
     Attributes
     ----------
     path : str
-    value, scale : float
+    value, scale, h : float
+        Itself, its size, and the step of differences.
     gain : ndarray
         How many times the gain of each law it is, where it is a gain alone, shape (n_law,).
     first, stimulus : ndarray
@@ -92,6 +95,7 @@ class Number:
     path: str
     value: float
     scale: float
+    h: float
     gain: Array
     first: Array
     stimulus: Array
@@ -129,7 +133,7 @@ class VariedNumbers:
     here : StepAgain
         Of the run's model.
     step : float
-        h of a number, over its size.
+        h of a number, over its size, where it moves no held nodes far.
     size : float
         Length of the longest rod [m].
     from_start : bool
@@ -197,25 +201,27 @@ class VariedNumbers:
         shares = shares_of(self.model, self._builders.model_of, numbers, SPACING)  # as given, like lengths of steps
         return {name: [self._number(path, value, shares.get(path)) for path, value in of] for name, of in paths.items()}
 
-    def _number(self, path: str, value: float, share: Array | None) -> Number:
+    def _number(self, path: str, value: float, share: Array | None, part: float = 1.0) -> Number:
         driven, scale = self.driven, abs(value) or min(1.0, self.size * STEP / self.step)
-        found = Number(path, value, scale, np.zeros(len(self.here.laws)), 0.0 * driven.first, 0.0 * driven.stimulus)
+        h, gain = part * self.step * scale, np.zeros(len(self.here.laws)) if share is None else share
+        found = Number(path, value, scale, h, gain, 0.0 * driven.first, 0.0 * driven.stimulus)
         if share is not None:
-            found.gain[:] = share
             return found
-        scenes = [scene_with(self.scene, {path: value + place * self.step * found.scale}) for place in PLACES]
+        scenes = [scene_with(self.scene, {path: value + place * h}) for place in PLACES]
         if all(not differing(self.scene, scene) for scene in scenes):
             models = [replace(self.model, scene=scene) for scene in scenes]
             around = [Surroundings(model, self._stepper.ahead) for model in models]
             if path.startswith("stimuli."):
                 found.around = around
                 first, stimulus = zip(*map(self._drive, around), strict=True)
-                h = self.step * found.scale
                 found.first, found.stimulus = slope(first, h), slope(stimulus, h)
                 return found
             found.agains = [self.again(model, of) for model, of in zip(models, around, strict=True)]
         else:
             found.agains, found.own = [self.again(self._builders.model_of(scene)) for scene in scenes], True
+            sizes = {(of.size, of.model.node_count, of.end_rates.size) for of in found.agains}
+            if len(sizes) > 1 or sizes.pop()[:2] != (self.here.size, self.model.node_count):
+                raise InputError(f"gradient: {path} changes how many unknowns the model has")
             raised = [of.problem.raised.edge for of in (found.agains[0], self.here)]
             if found.agains[0].end_rates.size != self.here.end_rates.size or not np.array_equal(*raised):
                 rates = self._first_rates(found)
@@ -228,11 +234,16 @@ class VariedNumbers:
                 found.rates = [(of, more) for of in rates]
         for again in found.agains:
             refuse_other_plane(self.model, again.model, path, moves=False)
-        if any(
-            again.size != self.here.size or again.model.node_count != self.model.node_count for again in found.agains
-        ):
-            raise InputError(f"gradient: {path} changes how many unknowns the model has")
-        return found
+        shift, most = self._shift(found), SHIFT * self.here.problem.strands.rest_length.min()
+        return found if shift <= most else self._number(path, value, laws, 0.5 * part * most / shift)
+
+    def _shift(self, number: Number) -> float:
+        """Return how far a number moves nodes that bodies hold, from end to end of its step, while others stay [m]."""
+        held, own, places = self.model.constrained.node, number.rates or [None] * len(PLACES), []
+        for k in (0, -1):
+            ends = [self.fitted(number.agains[k], of, own[k]) for of in (self._course.start, self._course.end)]
+            places.append([end.position[held] for end in ends])
+        return float(np.abs(np.subtract(*places)).max(initial=0.0))
 
     def _drive(self, around: Surroundings) -> tuple[Array, Array]:
         """Return the stimuli at the start of each step and at its stages under other schedules."""
@@ -255,7 +266,7 @@ class VariedNumbers:
         if self.from_start and self.scene.start == SETTLE:
             h, states = self._settled(number)
         elif self.from_start and not number.gain.any():
-            h = self.step * number.scale
+            h = number.h
             states = [self._builders.state_of(of.model) for of in number.agains or number.around]
         else:
             return place, speed, 0.0 * own.strain_rate, 0.0 * own.transduction
@@ -304,12 +315,17 @@ class VariedNumbers:
             return [self._builders.state_of(again.model).strain_rate for again in number.agains]
         h, states = self._settled(number)
         rates = [state.strain_rate for state in states]
-        return [np.mean(rates, axis=0) + place * self.step * number.scale * slope(rates, h) for place in PLACES]
+        return [np.mean(rates, axis=0) + place * number.h * slope(rates, h) for place in PLACES]
 
     def _settled(self, number: Number) -> tuple[float, list[State]]:
         """Return a step of a number, and the states from which runs begin with it at `PLACES`."""
         rest = Equilibrium(self._stepper, self._course.start, self._builders, self._description)
         response = rest.respond(rest.parameters([number.path])[number.path][0])
+        if response.moves and rest.floats:
+            raise InputError(
+                f"gradient: a robot that floats at its start turns as it settles, and how far {number.path} turns it "
+                "has no derivative; hold it, or leave out `start: settle`"
+            )
         states = []
         for near, place in zip(response.nearby, PLACES, strict=True):
             states.append(near.moved(response.motion * (place * response.h)))
@@ -345,7 +361,7 @@ class VariedNumbers:
 
     def in_step(self, number: Number, step: KeptStep, reached: Sequence[Reached]) -> Direct:
         """Return what a number changes by itself in a step, apart from stimuli and gains."""
-        here, h = self.here, self.step * number.scale
+        here, h = self.here, number.h
         found = Direct(
             [],
             np.zeros(here.size),
