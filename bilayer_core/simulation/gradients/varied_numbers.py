@@ -235,7 +235,7 @@ class VariedNumbers:
         for again in found.agains:
             refuse_other_plane(self.model, again.model, path, moves=False)
         shift, most = self._shift(found), SHIFT * self.here.problem.strands.rest_length.min()
-        return found if shift <= most else self._number(path, value, laws, 0.5 * part * most / shift)
+        return found if shift <= most else self._number(path, value, None, 0.5 * part * most / shift)
 
     def _shift(self, number: Number) -> float:
         """Return how far a number moves nodes that bodies hold, from end to end of its step, while others stay [m]."""

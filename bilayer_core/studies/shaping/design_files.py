@@ -93,13 +93,14 @@ def pattern_text(result: DesignResult) -> str:
 
 
 def _write_picture(result: DesignResult, path: Path, force: bool) -> None:
-    """Draw curves in the plane where they are widest at the left, patterns at the right."""
+    """Draw curves in the plane where they are widest at the left, each pattern by itself at the right."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(WIDTH, HEIGHT), layout="constrained")
     FigureCanvasAgg(figure)
-    left, right = figure.subplots(1, 2)
+    grid = figure.add_gridspec(len(result.varied), 2)
+    left, rights = figure.add_subplot(grid[:, 0]), [figure.add_subplot(grid[k, 1]) for k in range(len(result.varied))]
     drawn = np.concatenate([shape.target.points for shape in result.shapes])
     one, other = sorted(np.argsort(np.ptp(drawn, axis=0))[1:].tolist())
     for k, shape in enumerate(result.shapes):
@@ -113,14 +114,12 @@ def _write_picture(result: DesignResult, path: Path, force: bool) -> None:
     left.set_xlabel(f"{'xyz'[one]} [mm]", fontsize=8)
     left.set_ylabel(f"{'xyz'[other]} [mm]", fontsize=8)
     left.legend(frameon=False, fontsize=7)
-    for v, own in zip(result.varied, result.values, strict=True):
-        if v.at:
-            right.plot(1e3 * np.array(v.at), v.in_scene(own), ".-", linewidth=1.0, markersize=3, label=v.path)
-        else:
-            right.axhline(own[0], linewidth=1.0, label=v.path)
-    right.set_xlabel("along the rod [mm]", fontsize=8)
-    right.legend(frameon=False, fontsize=6)
-    for axes in (left, right):
+    for right, v, own in zip(rights, result.varied, result.values, strict=True):
+        along, values = v.at or (0.0, result.size), v.in_scene(own) if v.at else np.repeat(own, 2)
+        right.plot(1e3 * np.array(along), values, ".-", linewidth=1.0, markersize=3)
+        right.set_title(v.path, fontsize=6, loc="left")
+    rights[-1].set_xlabel("along the rod [mm]", fontsize=8)
+    for axes in (left, *rights):
         axes.tick_params(labelsize=7)
         axes.grid(linewidth=0.3, alpha=0.5)
     figure.suptitle(f"{result.scene.name}: rms distance {100 * result.rms:.3g} % of the rod", fontsize=8)

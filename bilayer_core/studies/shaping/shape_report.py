@@ -1,4 +1,4 @@
-"""What is told of a pattern that was found: how near it comes, whether it is stable and reached, and what limits it."""
+"""Report on a pattern that was found: how near it comes, whether it is stable and reached, and what limits it."""
 
 from __future__ import annotations
 
