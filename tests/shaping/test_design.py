@@ -359,6 +359,11 @@ def test_bad_input_of_a_design_is_refused(target, vary, message):
         design("bending", target, vary)
 
 
+def test_a_width_that_cancels_from_bending_under_weight_acts_on_nothing():
+    with pytest.raises(InputError, match="vary rods.strip.width: acts on nothing"):
+        design("bending", straight(0.1), {"rods.strip.width": (5e-3, 20e-3)}, overrides=HANGING)
+
+
 @pytest.mark.parametrize("smoothness", [math.nan, math.inf, -1.0])
 def test_a_smoothness_that_is_no_weight_is_refused(smoothness):
     with pytest.raises(InputError, match="smoothness: .* must be a finite number from 0 up"):

@@ -34,6 +34,8 @@ LONGEST = 1.1
 """Length of a wanted curve, of the longest rod within the bounds; that of the shortest, of a wanted curve."""
 ASIDE = 0.05
 """Of its length: by how much a curve may leave its plane where the rod stays in one."""
+IDLE = 1e-8
+"""Motion of the rod from one bound to the other, of its length, that is rounding of differences, which is 1e-10."""
 
 
 class Stopped(Exception):  # noqa: N818 it is no error
@@ -288,7 +290,7 @@ class ShapedRod:
 
     def _refuse_idle(self) -> None:
         moved = np.max([np.abs(slopes).max(axis=(0, 1)) for slopes in self.slopes()], axis=0)
-        acts = self.pattern.split(moved * (self.pattern.high - self.pattern.low) >= 1e-12 * self.size)
+        acts = self.pattern.split(moved * (self.pattern.high - self.pattern.low) >= IDLE * self.size)
         if idle := [v.path for v, own in zip(self.varied, acts, strict=True) if not own.any()]:
             of = rod_of(self.scene, self.varied).name
             raise InputError(f"vary {', '.join(idle)}: acts on nothing of rods.{of} at these stimuli; leave it out")
