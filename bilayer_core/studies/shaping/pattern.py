@@ -11,11 +11,10 @@ L. Babai, On Lovász' lattice reduction and the nearest lattice point problem, C
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from itertools import product
 
 import numpy as np
-from scipy.linalg import LinAlgError, cholesky, lstsq, solve_triangular
+from scipy.linalg import lstsq
 from scipy.optimize import lsq_linear
 
 from bilayer_core.studies.shaping.varied import Varied
@@ -27,8 +26,6 @@ FAINT = 1e-4
 """Weight of staying: pieces that cannot be told apart stay near what is best without a palette, within its bounds."""
 SWEEPS = 20
 """Most passes over the pieces of palettes."""
-WELL = 1e-5
-"""Least pivot of a triangle, of the largest, that the squares of its numbers determine to 1e-6."""
 
 
 class Pattern:
@@ -94,8 +91,9 @@ class Pattern:
             Weight of staying there.
         """
         matrix, wanted, part = *self._problem(rows, right, now, damping), self.parts(now)
-        r, wanted = _triangle(matrix[:, moving], wanted - matrix[:, ~moving] @ part[~moving])
-        found = solve_triangular(r, wanted) if _is_well(r) else lstsq(r, wanted)[0]
+        q, r = np.linalg.qr(matrix[:, moving])
+        wanted = q.T @ (wanted - matrix[:, ~moving] @ part[~moving])
+        found = lstsq(r, wanted)[0]
         if not ((found >= 0.0) & (found <= 1.0)).all():
             found = lsq_linear(r, wanted, bounds=(0.0, 1.0), tol=1e-12).x
         part[moving] = np.clip(found, 0.0, 1.0)
@@ -107,7 +105,8 @@ class Pattern:
         chosen, free = (np.flatnonzero(moving & of).tolist() for of in (self.in_palette, ~self.in_palette))
         choices = {k: (np.array(self._palettes[k]) - self.low[k]) / (self.high[k] - self.low[k]) for k in chosen}
         order = free + chosen[::-1]
-        r, turned = _triangle(matrix[:, order], wanted - matrix[:, ~moving] @ part[~moving])
+        q, r = np.linalg.qr(matrix[:, order])
+        turned = q.T @ (wanted - matrix[:, ~moving] @ part[~moving])
         for place in reversed(range(len(order))):
             k = order[place]
             best = (turned[place] - r[place, place + 1 :] @ part[order[place + 1 :]]) / r[place, place]
@@ -142,22 +141,3 @@ class Pattern:
         rows = rows * (self.high - self.low)
         wanted = [rows @ part - right, np.zeros(len(self._rough)), held @ part]
         return np.concatenate([rows, self._rough, held]), np.concatenate(wanted)
-
-
-def _triangle(matrix: Array, right: Array) -> tuple[Array, Array]:
-    """Return R of a matrix QR, and Qᵀ times the right side: by Cholesky's factor of RᵀR where it is good enough, as
-    threads of QR wait for each other on a machine that is busy, a hundred times as long as one thread takes.
-    """
-    with suppress(LinAlgError):
-        r = cholesky(matrix.T @ matrix)
-        if _is_well(r):
-            turned = solve_triangular(r, matrix.T @ right, trans="T")
-            left = right - matrix @ solve_triangular(r, turned)
-            return r, turned + solve_triangular(r, matrix.T @ left, trans="T")  # as precise as by QR
-    q, r = np.linalg.qr(matrix)
-    return r, q.T @ right
-
-
-def _is_well(triangle: Array) -> bool:
-    pivots = np.abs(np.diagonal(triangle))
-    return len(triangle) == triangle.shape[1] and bool(pivots.min() > WELL * pivots.max())
