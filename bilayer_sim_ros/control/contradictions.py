@@ -18,6 +18,8 @@ NEAR = 1.0
 """Real time within which messages are looked at together, where control periods are shorter [s]."""
 MOST_SOURCES = 8
 """Controllers of a channel that are remembered."""
+UNKNOWN = "_NODE_NAME_UNKNOWN_"
+"""Name of a node until it is discovered, and of publishers that belong to none (rmw)."""
 
 
 @dataclass(frozen=True)
@@ -106,4 +108,6 @@ def _sender(node: Node, source: Source) -> str:
     publishers = node.get_publishers_info_by_topic(source.topic)
     known = [publisher for publisher in publishers if bytes(publisher.endpoint_gid) == source.publisher]
     names = {f"{of.node_namespace.rstrip('/')}/{of.node_name}" for of in known or publishers}
+    if any(UNKNOWN in name for name in names):
+        return "a node whose name is not known"
     return shortened(", ".join(sorted(names)) or "a node that has left")

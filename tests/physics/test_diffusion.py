@@ -50,7 +50,7 @@ def test_all_that_follows_one_field_has_the_same_modes_and_a_lag_has_one():
     assert drives.law_field.tolist() == [0, 0, 0, 0]
     assert len(drives.mode_rising) == 2 * DEGREE  # 2 · 12 points, one shared, one given
     lag = build_model(load_scene(everything())).drives
-    assert (lag.law_weight.tolist(), lag.field_first.tolist()) == ([1.0], [0, 1])
+    assert (lag.law_weight.tolist(), lag.field_first.tolist()) == ([1.0, 1.0], [0, 1])  # one for each layer
 
 
 @pytest.mark.parametrize("integrator", INTEGRATORS)

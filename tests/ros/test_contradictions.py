@@ -9,7 +9,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from bilayer_core.scene.schedule import Hold
-from bilayer_sim_ros.control.contradictions import Contradictions, Source
+from bilayer_sim_ros.control.contradictions import UNKNOWN, Contradictions, Source
 from bilayer_sim_ros.control.stimulus import Channel
 
 HEAT = Channel("heat", 0.0, 1.0, Hold(type="hold", value=0.0))
@@ -73,6 +73,12 @@ def test_one_that_comes_back_much_later_is_not_told():
     assert listened.told == []
 
 
+def _names(node, topic):
+    """Return the names of the nodes that publish a topic, none before all of them are known."""
+    names = [of.node_name for of in node.get_publishers_info_by_topic(topic)]
+    return [] if UNKNOWN in names else names
+
+
 def test_the_node_warns_once_with_channel_values_topics_and_nodes(contexts, noting_node):
     node = noting_node()
     client, other = Node("open_loop", context=contexts[1]), Node("closed_loop", namespace="lab", context=contexts[1])
@@ -80,6 +86,9 @@ def test_the_node_warns_once_with_channel_values_topics_and_nodes(contexts, noti
     stamped = other.create_publisher(JointState, "/bilayer_sim/stimulus_stamped", 10)
     executor, deadline = SingleThreadedExecutor(context=contexts[0]), time.monotonic() + 30.0
     executor.add_node(node)
+    while not all(_names(node, topic) for topic in (plain.topic_name, stamped.topic_name)):
+        assert time.monotonic() < deadline, "the controllers were not discovered"
+        executor.spin_once(timeout_sec=0.02)
     for turn in range(200):
         plain.publish(Float64(data=0.25))
         stamped.publish(JointState(name=["swelling"], position=[0.75]))
