@@ -130,7 +130,7 @@ def test_a_strip_lies_on_a_post_with_a_pattern_that_is_found_through_contact():
     assert found.values[0] == pytest.approx([0.0, 0.01, 0.0], abs=1e-3)
 
 
-def test_two_layers_that_swell_make_the_rod_as_long_as_the_curve_and_one_says_what_is_left():
+def test_two_layers_make_the_rod_as_long_as_the_curve_and_one_says_what_is_left():
     turn = 0.5 * np.sin(np.linspace(0.0, 2.0 * math.pi, 60))
     curve = np.cumsum(np.stack([np.cos(turn), 0.0 * turn, np.sin(turn)], axis=1) * 0.107 / 59, axis=0)
     other, law = "rods.strip.layers.passive.eigenstrain", {"stimulus": "swelling", "gain": 0.01}
