@@ -14,7 +14,8 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
-from scipy.linalg import lstsq
+from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dtpqrt
 from scipy.optimize import lsq_linear
 
 from bilayer_core.studies.shaping.varied import Varied
@@ -24,8 +25,14 @@ POINTS = 100
 """Of the pattern whose roughness has the given weight; that of others goes as the square of their number."""
 FAINT = 1e-4
 """Weight of staying: pieces that cannot be told apart stay near what is best without a palette, within its bounds."""
+FAINTEST = 1e-10
+"""The least weight of staying: what moves nothing stays where it is."""
 SWEEPS = 20
 """Most passes over the pieces of palettes."""
+FEW, BLOCK, AT_ONCE = 200, 32, 8192
+"""Columns that are reflected one by one, otherwise so many together, and elements of rows that are reflected at once:
+threads, which BLAS starts else, wait for each other longer than a small problem takes.
+"""
 
 
 class Pattern:
@@ -90,54 +97,67 @@ class Pattern:
         damping : float
             Weight of staying there.
         """
-        matrix, wanted, part = *self._problem(rows, right, now, damping), self.parts(now)
-        q, r = np.linalg.qr(matrix[:, moving])
-        wanted = q.T @ (wanted - matrix[:, ~moving] @ part[~moving])
-        found = lstsq(r, wanted)[0]
-        if not ((found >= 0.0) & (found <= 1.0)).all():
-            found = lsq_linear(r, wanted, bounds=(0.0, 1.0), tol=1e-12).x
-        part[moving] = np.clip(found, 0.0, 1.0)
-        return np.where(moving, self._at(part), now)
+        order = np.flatnonzero(moving)
+        matrix, wanted = self._triangle(rows, right, now, order, damping)
+        least, most = (self.parts(of)[order] - self.parts(now)[order] for of in (self.low, self.high))
+        step = solve_triangular(matrix, wanted)
+        if not ((step >= least) & (step <= most)).all():
+            step = lsq_linear(matrix, wanted, bounds=(least, most), tol=1e-12).x
+        return self._moved(now, order, step)
 
     def printable(self, rows: Array, right: Array, now: Array, moving: Array) -> Array:
         """Return values likewise, those with a palette of their palettes."""
-        matrix, wanted, part = *self._problem(rows, right, now, FAINT), self.parts(now)
-        chosen, free = (np.flatnonzero(moving & of).tolist() for of in (self.in_palette, ~self.in_palette))
-        choices = {k: (np.array(self._palettes[k]) - self.low[k]) / (self.high[k] - self.low[k]) for k in chosen}
-        order = free + chosen[::-1]
-        q, r = np.linalg.qr(matrix[:, order])
-        turned = q.T @ (wanted - matrix[:, ~moving] @ part[~moving])
-        for place in reversed(range(len(order))):
-            k = order[place]
-            best = (turned[place] - r[place, place + 1 :] @ part[order[place + 1 :]]) / r[place, place]
-            part[k] = choices[k][np.argmin(np.abs(choices[k] - best))] if k in choices else np.clip(best, 0.0, 1.0)
-        self._change_together(matrix, matrix @ part - wanted, part, choices)
-        values = np.where(moving, self._at(part), now)
-        for k in chosen:
-            values[k] = self._palettes[k][np.argmin(np.abs(choices[k] - part[k]))]
+        chosen, free = (np.flatnonzero(moving & of) for of in (self.in_palette, ~self.in_palette))
+        order = np.concatenate([free, chosen[::-1]])
+        matrix, wanted = self._triangle(rows, right, now, order, FAINT)
+        least, most = (self.parts(of)[order] - self.parts(now)[order] for of in (self.low, self.high))
+        palettes = [np.array(self._palettes[k]) for k in order]
+        steps = [(own - now[k]) / (self.high - self.low)[k] for k, own in zip(order, palettes, strict=True)]
+        found = np.zeros(len(order))
+        for k in reversed(range(len(order))):
+            best = (wanted[k] - matrix[k, k + 1 :] @ found[k + 1 :]) / matrix[k, k]
+            allowed = steps[k] if len(steps[k]) else np.clip([best], least[k], most[k])
+            found[k] = allowed[np.argmin(np.abs(allowed - best))]
+        self._change_together(matrix, matrix @ found - wanted, found, steps)
+        values = self._moved(now, order, found)
+        for k, own in zip(order, palettes, strict=True):
+            values[k] = own[np.argmin(np.abs(own - values[k]))] if len(own) else values[k]
         return values
 
-    def _change_together(self, matrix: Array, left: Array, found: Array, choices: dict[int, Array]) -> None:
+    def _change_together(self, matrix: Array, left: Array, found: Array, steps: list[Array]) -> None:
         """Let neighbours have other values of their palettes as long as the squares of what is left get smaller."""
-        pairs = [[k, k + 1] if k + 1 in choices else [k] for k in choices]
+        chosen = [k for k, own in enumerate(steps) if len(own)][::-1]
+        pairs = [*zip(chosen, chosen[1:], strict=False), chosen[-1:]]
         for _ in range(SWEEPS):
             before = left @ left
             for pair in pairs:
-                columns = matrix[:, pair]
-                tried = np.array(list(product(*(choices[k] for k in pair))))
-                after = left[:, None] + columns @ (tried - found[pair]).T
+                some = list(pair)
+                tried = np.array(list(product(*(steps[k] for k in some))))
+                after = left[:, None] + matrix[:, some] @ (tried - found[some]).T
                 best = int(np.argmin((after**2).sum(axis=0)))
-                found[pair], left = tried[best], after[:, best]
+                found[some], left = tried[best], after[:, best]
             if left @ left >= (1.0 - 1e-9) * before:
                 break
 
-    def _at(self, part: Array) -> Array:
-        return self.low + (self.high - self.low) * part
+    def _moved(self, now: Array, order: Array, step: Array) -> Array:
+        """Return values of which some are moved by parts of the way between their bounds."""
+        part = self.parts(now)
+        part[order] = np.clip(part[order] + step, 0.0, 1.0)
+        values = now.copy()
+        values[order] = (self.low + (self.high - self.low) * part)[order]
+        return values
 
-    def _problem(self, rows: Array, right: Array, now: Array, damping: float) -> tuple[Array, Array]:
-        """Return the matrix and the right side of equations for parts of the way between bounds."""
-        count, part = len(self.low), self.parts(now)
-        held = damping * np.eye(count if damping else 0, count)
-        rows = rows * (self.high - self.low)
-        wanted = [rows @ part - right, np.zeros(len(self._rough)), held @ part]
-        return np.concatenate([rows, self._rough, held]), np.concatenate(wanted)
+    def _triangle(self, rows: Array, right: Array, now: Array, order: Array, damping: float) -> tuple[Array, Array]:
+        """Return the triangular matrix and the right side of equations for steps of some parts, in some order.
+
+        Those of staying are triangular; a few of the others after the other are reflected into them.
+        """
+        count, rough = len(order), self._rough @ self.parts(now)
+        equations = np.empty((len(rows) + len(rough), count + 1), order="F")
+        equations[:, :-1] = np.concatenate([rows * (self.high - self.low), self._rough])[:, order]
+        equations[:, -1] = np.concatenate([-right, -rough])
+        found = np.asfortranarray(np.diag([max(damping, FAINTEST)] * count + [0.0]))
+        columns = 1 if count <= FEW else BLOCK
+        for some in np.array_split(equations, -(-equations.size // AT_ONCE)):
+            found, *_ = dtpqrt(0, columns, found, some, overwrite_a=1)
+        return found[:-1, :-1], found[:-1, -1]
