@@ -132,6 +132,13 @@ class Engine:
         extrema.body_top[:] = -math.inf
         extrema.nodes[:], extrema.most_nodes[:], extrema.first_contact[:] = 0, 0, math.nan
 
+    def take_extrema(self, other: RunExtrema) -> None:
+        """Go on from the extrema of a run in another model."""
+        for name in other.changing:
+            setattr(self.extrema, name, getattr(other, name))
+        for name in other.shapes:
+            getattr(self.extrema, name)[:] = getattr(other, name)
+
     def integrate(
         self, state: State, until: float, due: float, most: int, passes: int, patience: int, goes_on: bool
     ) -> IntegrationReport:
@@ -275,6 +282,13 @@ class Engine:
         near = self._storage.problem.surfaces
         surface = self._model.surface_names[near.near_surface[pair]]
         return f"{contact_point_names(self._model)[near.near_contact_point[pair]]} would reach the surface of {surface}"
+
+    @property
+    def deepest_pair(self) -> int:
+        """Near pair that reaches deepest into each other, −1 if none does."""
+        near = self._storage.problem.surfaces
+        gaps = near.near_gap[: near.near_count[0]] if near.exists else np.zeros(0)
+        return int(gaps.argmin()) if gaps.min(initial=1.0) <= 0.0 else -1
 
     @property
     def moved(self) -> float:

@@ -99,6 +99,10 @@ class State:
             setattr(copied, name, copied.values[begin:end].reshape(shape))
         return copied
 
+    def become(self, other: State) -> None:
+        """Take all of another state, which may be of another model, with arrays of other sizes."""
+        vars(self).update(vars(other.copy()))
+
     def take(self, other: State) -> None:
         """Take all values of another state of the same model."""
         self.values[:] = other.values
@@ -159,14 +163,17 @@ def turn_directors(model: Model, state: State) -> None:
 
     They have velocities of their own (`forces.raised`), which a state whose velocities someone sets has to be given.
     """
-    edge = model.raised.edge
-    first, second = (state.position[model.rods.edge_node[edge] + end] for end in (0, 1))
-    vector, director = second - first, state.director1[edge]
+    _kept_rates(model, state)[model.raised.slot] = turning(model, state)[model.raised.edge]
+
+
+def turning(model: Model, state: State) -> Array:
+    """Return ṁ1 of edges that turn as the velocities of nodes and their spins say [1/s], shape (n_edge, 3)."""
+    first = model.rods.edge_node
+    vector, director = state.position[first + 1] - state.position[first], state.director1
     length = np.linalg.norm(vector, axis=1, keepdims=True)
-    lengthened = state.velocity[model.rods.edge_node[edge] + 1] - state.velocity[model.rods.edge_node[edge]]
+    lengthened = state.velocity[first + 1] - state.velocity[first]
     tangent, leaning = vector / length, np.einsum("ki,ki->k", director, lengthened)[:, None] / length
-    turned = state.spin[edge, None] * cross(tangent, director)
-    _kept_rates(model, state)[model.raised.slot] = turned - leaning * tangent
+    return state.spin[:, None] * cross(tangent, director) - leaning * tangent
 
 
 def _kept_rates(model: Model, state: State) -> Array:

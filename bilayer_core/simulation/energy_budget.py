@@ -97,14 +97,18 @@ class EnergyLedger:
     """Sums works since `begin`, from `record` after every accepted step or part of one."""
 
     def __init__(self, model: Model):
+        self._kinds: dict[str, Kind] = {}
+        self._take(model)
+        self._first: _Instant | None = None
+
+    def _take(self, model: Model) -> None:
         self._model = model
         self._evaluator = Evaluator(model)  # with arrays of its own: those of the run stay as they are
         self._imposed_mass = np.zeros(model.node_count)
         imposed = model.constrained.node[model.constrained.free < 0]
         self._imposed_mass[imposed] = model.rods.node_mass[imposed]
-        self._kinds = {name: kinds()[name] for name in model.forces}
-        self._watched = [name for name, kind in self._kinds.items() if kind is not Kind.INERTIAL]
-        self._first: _Instant | None = None
+        self._kinds |= {name: kinds()[name] for name in model.forces}
+        self._watched = [name for name in model.forces if self._kinds[name] is not Kind.INERTIAL]
 
     def begin(self, state: State, load_factor: Array) -> None:
         """Start from zero at a state, with the factors of loads there."""
@@ -112,6 +116,7 @@ class EnergyLedger:
         self._work: dict[str, float] = defaultdict(float)  # of each force [J]
         self._imposed: dict[str, float] = defaultdict(float)  # of it on what prescribed bodies impose [J]
         self._stimulus = 0.0
+        self._jumped: dict[str, float] = defaultdict(float)  # energies, where the model was replaced [J]
 
     def begin_step(self, state: State, load_factor: Array) -> None:
         """Take the factors of loads, and the coefficients of friction, with which a step begins, where they have jumped
@@ -120,6 +125,20 @@ class EnergyLedger:
         same = np.array_equal(state.friction, self._last.friction, equal_nan=True)
         if not (same and np.array_equal(load_factor, self._last.load_factor)):
             self._last = self._evaluate_state(state, load_factor)
+
+    def take_model(self, model: Model, before: State, state: State, load_factor: Array) -> None:
+        """Go on from a state `before` in another model, as `state`; what that changes of energies is supplied."""
+        self.begin_step(before, load_factor)
+        last = self._last
+        self._take(model)
+        self._last = self._evaluate_state(state, load_factor)
+        for name, kind in self._kinds.items():
+            if kind is Kind.CONSERVATIVE:
+                self._jumped["stored"] += self._last.energy.get(name, 0.0) - last.energy.get(name, 0.0)
+        self._jumped["kinetic"] += self._last.kinetic - last.kinetic
+        self._jumped["imposed"] += self._last.imposed_kinetic - last.imposed_kinetic
+        if last.fluid is not None:
+            self._jumped["fluid"] += self._last.fluid.energy - last.fluid.energy
 
     def record(self, state: State, load_factor: Array, h: float) -> None:
         """Add the works of a step of length `h` [s] that has just been accepted."""
@@ -160,24 +179,29 @@ class EnergyLedger:
         """
         first, last, work = self._first, self._last, self._work
         of_kind = {kind: [name for name, own in self._kinds.items() if own is kind] for kind in Kind}
-        imposed_kinetic = last.imposed_kinetic - first.imposed_kinetic
+        jumped = self._jumped
+        imposed_kinetic = last.imposed_kinetic - first.imposed_kinetic - jumped["imposed"]
         prescribed = imposed_kinetic - sum(self._imposed.values())
         kinetic = last.kinetic - first.kinetic
         supplied = {"stimulus": self._stimulus, "prescribed motion": prescribed}
         supplied |= {name: work[name] for name in of_kind[Kind.EXTERNAL]}
+        if any(jumped.values()):
+            supplied["other values"] = jumped["stored"] + jumped["kinetic"] + jumped["fluid"]
         stored = {"kinetic": kinetic}
         if last.fluid is not None:
             stored["fluid"] = last.fluid.energy - first.fluid.energy
-        stored |= {name: last.energy[name] - first.energy[name] for name in of_kind[Kind.CONSERVATIVE]}
+        now, then = last.energy, first.energy
+        stored |= {name: now.get(name, 0.0) - then.get(name, 0.0) for name in of_kind[Kind.CONSERVATIVE]}
         lost = {name: -work[name] for name in of_kind[Kind.DISSIPATIVE]}
-        lost["numerical"] = sum(work.values()) + prescribed - kinetic - stored.get("fluid", 0.0)
+        moving = kinetic + stored.get("fluid", 0.0) - jumped["kinetic"] - jumped["fluid"]
+        lost["numerical"] = sum(work.values()) + prescribed - moving
         residual = sum(supplied.values()) - sum(stored.values()) - sum(lost.values())
         largest = max(abs(value) for rows in (supplied, stored, lost) for value in rows.values())
         return {
             "supplied": supplied,
             "stored": stored,
             "lost": lost,
-            "work": {name: work[name] for name in self._watched},
+            "work": {name: work[name] for name, kind in self._kinds.items() if kind is not Kind.INERTIAL},
             "residual": residual,
             "relative_residual": float(residual) / float(largest) if largest > 0.0 else 0.0,
         }

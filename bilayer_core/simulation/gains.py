@@ -31,19 +31,9 @@ def alike_but_gains(model: Model, other: Model, besides: Collection[str] = ()) -
 
 def put_gains(model: Model, gains: Array) -> None:
     """Write gains into a model in place, and so into whatever was built from it."""
-    _write(model.drives.law_gain, gains)
-
-
-def take_gains(model: Model, other: Model) -> None:
-    """Write the gains of another model likewise, with the `SPACING` that they ask for."""
-    put_gains(model, other.drives.law_gain)
-    for name in SPACING:
-        _write(getattr(model.surfaces, name), getattr(other.surfaces, name))
-
-
-def _write(held: Array, values: Array) -> None:
+    held = model.drives.law_gain
     held.flags.writeable = True
-    held[:] = values
+    held[:] = gains
     held.flags.writeable = False
 
 

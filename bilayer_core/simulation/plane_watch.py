@@ -79,6 +79,10 @@ class PlaneWatch:
             take(self._space)
             take(self._plane)
 
+    def take_model(self, duration: float) -> None:
+        """Go on with another model, which `make` gives to steppers."""
+        self._duration, self._space = duration, None
+
     def restart(self, time: float) -> None:
         """Begin anew at a time [s]."""
         self.since: float | None = None

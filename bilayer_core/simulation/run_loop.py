@@ -14,6 +14,7 @@ from bilayer_core.engine.step_outcome import IntegrationReport
 from bilayer_core.errors import InputError, SimulationError
 from bilayer_core.jit.compile_all import ensure_compiled
 from bilayer_core.jit.piece import loading
+from bilayer_core.model.model import Model
 from bilayer_core.model.state import State
 from bilayer_core.observed.inputs import Input
 from bilayer_core.observed.observer import Observed, Observer
@@ -23,6 +24,7 @@ from bilayer_core.simulation.observers import Schedule, first_failure
 from bilayer_core.simulation.plane_watch import PlaneWatch
 from bilayer_core.simulation.run_result import RunResult, Termination
 from bilayer_core.simulation.statistics import RunStatistics, center_of_mass
+from bilayer_core.simulation.step_choice import Steps
 from bilayer_core.simulation.step_span import StepSpan
 from bilayer_core.simulation.stepper import Stepper, StepReport
 from bilayer_core.simulation.strip_sections import FOLDS, folds
@@ -157,6 +159,31 @@ class RunLoop:
         self._stepper.evaluate(self._state)
         self._statistics.take_shape(self._stepper, self._state)
         self._stepper.begin_budget(self._state)
+
+    def go_on(self, model: Model, steps: Steps, begin: State) -> None:
+        """Go on with another model from a state that is the present one there.
+
+        Raises
+        ------
+        InputError
+            If something reaches into another then; nothing is changed.
+        """
+        stepper, state, before = self._stepper, self._state, self._state.copy()
+        old = stepper.model, stepper.steps
+        stepper.take_model(model, steps)
+        stepper.evaluate(begin)
+        if not stepper.engine.gap > 0.0:
+            why = stepper.engine.who_blocks(stepper.engine.deepest_pair)
+            stepper.take_model(*old)
+            stepper.evaluate(state)
+            raise InputError(f"set_values: {why} with these values; all gaps must be positive; nothing is changed")
+        state.become(begin)
+        stepper.restart(state)
+        self._statistics.go_on(stepper, state)
+        if stepper.ledger is not None:
+            stepper.ledger.take_model(model, before, state, stepper.surroundings.load_factor(state))
+        if self._plane_watch is not None:
+            self._plane_watch.take_model(model.scene.duration)
 
     def compile(self) -> float:
         """Prepare kernels and the forces of the first state; see `Simulator.compile`."""

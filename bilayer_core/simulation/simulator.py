@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
@@ -35,7 +34,6 @@ from bilayer_core.simulation.controls import Controls
 from bilayer_core.simulation.energy_budget import EnergyLedger
 from bilayer_core.simulation.equilibrium import StaticReport, solve_static
 from bilayer_core.simulation.friction_changes import coefficients
-from bilayer_core.simulation.gains import SPACING, alike_but_gains, take_gains
 from bilayer_core.simulation.gradients.derivatives import DifferentiableRun, Gradient, differentiate
 from bilayer_core.simulation.gradients.equilibrium_response import Equilibrium
 from bilayer_core.simulation.gradients.nearby import Builders
@@ -46,6 +44,7 @@ from bilayer_core.simulation.observation import (
     positions_with_points,
     velocities_with_points,
 )
+from bilayer_core.simulation.other_values import state_with
 from bilayer_core.simulation.plane_watch import PlaneWatch
 from bilayer_core.simulation.poses import LEAST_TIME
 from bilayer_core.simulation.progress_bar import progress_bar
@@ -404,45 +403,42 @@ class Simulator:
         """
         self._controls.set_stimulus(channel, value, over=over, shape=shape)
 
-    def set_gains(self, gains: Mapping[str, Any]) -> None:
-        """Give eigenstrains other gains, from the next step on; nothing is built anew.
+    def set_values(self, values: Mapping[str, Any]) -> None:
+        """Give numbers of the scene other values, from the next step on: the robot goes on from where it is.
+
+        Materials, layers and sections of rods, gravity and damping may change: moduli, densities, gains, thickness,
+        width, and their profiles, which may have other points. What layers are made of stays in its place and keeps its
+        velocity. A model is built, as for a new simulator.
 
         Parameters
         ----------
-        gains : mapping of str to object
-            Values by the paths of gains in the scene, or of numbers of their profiles: a number, or a profile with as
-            many points: ``{"rods.strip.layers.active.eigenstrain.gain": 0.02}``.
+        values : mapping of str to object
+            By paths in the scene, as overrides of `load_scene`: ``{"materials.gel.youngs_modulus": 2e6}``,
+            ``{"rods.strip.layers.active.eigenstrain.gain.value": [0.01, 0.02, 0.0]}``.
 
         Raises
         ------
         InputError
-            If more would change than gains, as the number of points, or somebody observes the run: a log is of one
-            scene. Nothing is changed then.
+            If something else would change, a rod would reach into something, or somebody observes the run: a log is of
+            one scene. Nothing is changed then.
+        SceneError
+            If the scene cannot have these values.
         """
         if self._controls.listeners or self._loop.attached:
-            raise InputError("set_gains: takes no other gains while a log or an observer is attached; detach it first")
-        scene = load_content(scene_content(self.scene), gains)
-        other = build_model(scene, self.plan.model, self.plan.dimension)
-        paths, of_gains = ", ".join(gains), all(re.search(r"\.gain(\.|$)", path) for path in gains)
-        if not (of_gains and alike_but_gains(self.model, other, SPACING)):
-            raise InputError(
-                f"set_gains: {paths}: changes more than gains; allowed are numbers for numbers, and profiles with as "
-                "many points as before, with which nothing else may touch; else make a new Simulator"
-            )
-
-        def take(stepper: Stepper) -> None:
-            take_gains(stepper.model, other)
-            stepper.take_scene(scene, self.steps, scene.solver.max_newton_iterations)
-
-        take(self._stepper)
-        self.scene, self.model = scene, self._stepper.model
-        if self.plane_watch is not None:
-            self.plane_watch.take_scene(scene.duration, take)
-        self._fingerprint = fingerprint_of(scene, self.plan.model, self.plan.integrator if self._keeps_history else "")
-        self._conditions = float(conditions_of(scene))
-        self._state.fingerprint[:], self._state.conditions[:] = self._fingerprint, self._conditions
-        self._state.has_history.fill(0.0)  # accelerations jump
-        self._stepper.restart(self._state)
+            raise InputError("set_values: not while a log or an observer is attached; detach it first")
+        scene, plan = load_content(scene_content(self.scene), values), self.plan
+        plan = make_plan(scene, model=plan.model, dimension=plan.dimension, integrator=plan.integrator)
+        other = build_model(scene, plan.model, plan.dimension)
+        fingerprint = fingerprint_of(scene, plan.model, plan.integrator if self._keeps_history else "")
+        conditions = float(conditions_of(scene))
+        start = initial_state(other, self._keeps_history, fingerprint, memory_size(other), conditions)
+        begin = state_with(self.model, other, self._now, start)
+        self._loop.go_on(other, choose_steps(scene, self._method, *self._asked_steps), begin)
+        self.scene, self.model, self.steps = scene, other, self._stepper.steps
+        self.dt, self.tolerance = self.steps.dt, self.steps.tolerance
+        self.plan = replace(plan, reasons=self.plan.reasons)  # with other terms
+        self._fingerprint, self._conditions = fingerprint, conditions
+        self._present.forget_model()
 
     def set_load(self, name: str, factor: float | None, *, over: float = 0.0, shape: str = LINEAR) -> None:
         """Multiply force and moment of a load by a factor from the next step on.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bilayer_core.engine.energy_account import NUMERICAL
+from bilayer_core.engine.energy_account import NUMERICAL, OPEN
 from bilayer_core.engine.step_outcome import IntegrationReport
 from bilayer_core.model.bent_plates import BENT_PLATE
 from bilayer_core.model.model import Model
@@ -100,6 +100,20 @@ class RunStatistics:
         stepper.engine.count_shape(state)
         stepper.engine.open_account(state)
         self.numerical_before = float(state.account[NUMERICAL])
+
+    def go_on(self, stepper: Stepper, state: State) -> None:
+        """Take in the shape of a state that goes on in another model; energy that steps made before counts on.
+
+        Parameters
+        ----------
+        stepper : Stepper
+            In which it was evaluated.
+        state : State
+        """
+        made = float(state.account[NUMERICAL]) - self.numerical_before
+        state.account[OPEN] = 0.0
+        self.take_shape(stepper, state)
+        self.numerical_before -= made
 
     def update(self, report: IntegrationReport, whole: int) -> None:
         """Count some steps.

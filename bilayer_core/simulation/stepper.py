@@ -112,11 +112,16 @@ class Stepper:
 
     def __init__(self, model: Model, method: Method, steps: Steps, max_iterations: int):
         self._method = method
-        control = self._control_of(model, steps)
-        self.engine = Engine(model, method, control, steps.newton_tolerance, max_iterations)
-        self.engine.actuation = self.surroundings.actuation
         self.ledger: EnergyLedger | None = None
         self._passes = FIRST_PASSES
+        self._build(model, steps, max_iterations)
+
+    def _build(self, model: Model, steps: Steps, max_iterations: int) -> None:
+        control = self._control_of(model, steps)
+        self.engine = Engine(model, self._method, control, steps.newton_tolerance, max_iterations)
+        self.engine.actuation = self.surroundings.actuation
+        for name in ("_observables", "contact_owners"):
+            vars(self).pop(name, None)
 
     def _control_of(self, model: Model, steps: Steps) -> StepControl:
         """Take steps of a model, with what acts on it."""
@@ -152,6 +157,12 @@ class Stepper:
         self.engine.actuation = self.surroundings.actuation
         if self.ledger is not None:
             self.ledger = EnergyLedger(model)
+
+    def take_model(self, model: Model, steps: Steps) -> None:
+        """Take another model in which a state goes on, with its steps; extrema of the run are kept."""
+        extrema = self.engine.extrema
+        self._build(model, steps, model.scene.solver.max_newton_iterations)
+        self.engine.take_extrema(extrema)
 
     def begin_budget(self, state: State) -> None:
         """Start the energy budget from zero at a state, if it is kept."""

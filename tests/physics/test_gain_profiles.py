@@ -1,10 +1,10 @@
-"""Gains of eigenstrains as profiles along a rod, and gains that change while a simulator goes on."""
+"""Gains of eigenstrains as profiles along a rod."""
 
 import numpy as np
 import pytest
 
 from bilayer_core import Simulator, load_scene
-from bilayer_core.errors import InputError, SceneError
+from bilayer_core.errors import SceneError
 from bilayer_core.simulation.at_rest import equilibrium_of
 
 GAIN = "rods.strip.layers.active.eigenstrain.gain"
@@ -63,60 +63,6 @@ def test_a_profile_follows_a_lag_as_a_number_does():
     for simulator in (one, other):
         simulator.run(0.2)
     assert np.abs(one.positions - other.positions).max() < 1e-9
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_gains_that_are_set_act_as_those_of_a_new_simulator(kind):
-    simulator = at_rest(sloping(5, (0.0, 0.0)), kind)
-    simulator.set_gains({GAIN: sloping(5)})
-    simulator.solve_static()
-    assert np.abs(simulator.positions - at_rest(sloping(5), kind).positions).max() < 1e-10
-    assert simulator.scene.rods[0].layers[1].eigenstrain[0].gain.value[-1] == 0.01
-
-
-def test_layers_with_equal_laws_may_be_set_apart_and_together():
-    equal = {"rods.strip.layers.passive.eigenstrain": {"stimulus": "swelling", "gain": 0.01}}
-    passive = "rods.strip.layers.passive.eigenstrain.gain"
-    simulator, before = at_rest(0.01, **equal), at_rest(0.01, **equal).positions
-    simulator.set_gains({passive: 0.0})
-    simulator.solve_static()
-    assert np.abs(simulator.positions - at_rest(0.01, **equal | {passive: 0.0}).positions).max() < 1e-10
-    simulator.set_gains({passive: 0.01})
-    simulator.solve_static()
-    assert np.abs(simulator.positions - before).max() < 1e-10
-
-
-@pytest.mark.parametrize("name", ["bending", "crawling_film"])
-def test_a_run_with_gains_that_were_set_is_that_of_a_new_simulator_bit_for_bit(name):
-    if name == "bending":
-        simulator, other = hanging(sloping(5, (0.0, 0.0))), hanging(sloping(5))
-        simulator.set_gains({f"{GAIN}.value": sloping(5)["value"]})
-    else:  # how finely it looks for the ground depends on gains
-        gain = "rods.film.layers.active.eigenstrain.gain"
-        simulator, other = Simulator(load_scene(name)), Simulator(load_scene(name, {gain: 0.0042}))
-        assert not np.array_equal(simulator.model.surfaces.sharpest, other.model.surfaces.sharpest)
-        simulator.set_gains({gain: 0.0042})
-    for one in (simulator, other):
-        one.run(0.05)
-    assert np.array_equal(simulator.save_state(), other.save_state(), equal_nan=True)  # no stimulus from outside
-
-
-@pytest.mark.parametrize(
-    ("gains", "message"),
-    [
-        ({f"{GAIN}.at": [0, 0.05]}, "changes more than gains"),
-        ({GAIN: 0.01}, "changes more than gains"),
-        ({"rods.strip.width": 0.02}, "changes more than gains"),
-        ({f"{GAIN}.value": [0, 0, 0]}, "must be as many as `at`, 2"),
-        ({f"{GAIN}.value.0": -3}, "must leave the layer a length"),
-    ],
-)
-def test_other_changes_than_those_of_gains_are_refused_and_change_nothing(gains, message):
-    simulator = at_rest(sloping(2))
-    before = simulator.save_state()
-    with pytest.raises((InputError, SceneError), match=message):
-        simulator.set_gains(gains)
-    assert np.array_equal(simulator.save_state(), before)
 
 
 @pytest.mark.parametrize(

@@ -123,7 +123,7 @@ class DifferentiableRun:
             raise InputError(f"run: gradients: found {room!r}; allowed are True, False and a number of bytes above 0")
         self._course = Course(stepper, state) if room is True else Course(stepper, state, room)
         self._builders, self._description = builders, description
-        self._model, self._gains = stepper.model, stepper.model.drives.law_gain.copy()
+        self._stepper, self._model = stepper, stepper.model
 
     def keeping(self, each_step: Callable[[float], None] | None) -> Callable[[float], None]:
         """Return what is to be called after each step, and calls another function then."""
@@ -142,8 +142,8 @@ class DifferentiableRun:
 
     def response(self) -> RunResponse:
         """Return what goes along the steps and back."""
-        if not np.array_equal(self._gains, self._model.drives.law_gain):
-            raise InputError("gradient: the gains are others than in the run; differentiate before set_gains")
+        if self._stepper.model.drives is not self._model.drives:
+            raise InputError("gradient: the scene has other values than in the run; differentiate before set_values")
         from bilayer_core.simulation.gradients.run_response import RunResponse  # brings scipy's sparse solvers
 
         return RunResponse(self._course, self._builders.stepper_of(self._model), self._builders, self._description)

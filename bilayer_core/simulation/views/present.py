@@ -76,6 +76,10 @@ class Present:
         description = self._description()
         return {entry.name: entry for entry in entries(description, (), ())}, FrameValues(description)
 
+    def forget_model(self) -> None:
+        """Forget how rods are described, as they are others."""
+        vars(self).pop("_of_rods", None)
+
     def seen(self) -> Parts:
         """Return all observables of the present state."""
         self._ready()

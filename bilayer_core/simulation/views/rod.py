@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
-from bilayer_core.model.model import Model
 from bilayer_core.model.strand_arrays import StrandArrays
 from bilayer_core.observed.frame import Strand
 from bilayer_core.simulation import observation as observe
@@ -46,12 +47,16 @@ class RodView:
         Each `LayerView` by name.
     """
 
-    def __init__(self, present: Present, name: str, strands: list[StrandArrays]):
-        self._present, self.name, self._strands = present, name, strands
+    def __init__(self, present: Present, name: str):
+        self._present, self.name = present, name
 
     def __repr__(self) -> str:
         layers, tip = ", ".join(self.layers), self.middle_line[-1].tolist()
         return f"rod {self.name} (layers {layers}): {len(self.nodes)} nodes, the last at {tip}"
+
+    @property
+    def _strands(self) -> list[StrandArrays]:
+        return [s for s in self._present.model.strands if s.rod == self.name]
 
     @property
     def nodes(self) -> Array:
@@ -101,8 +106,7 @@ class RodView:
 
     @property
     def layers(self) -> ByName[LayerView]:
-        described = [layer for s in self._strands for of in [observe.strand(s)] for layer in of.layers or (of,)]
-        views = {layer.layer: LayerView(self._present, layer) for layer in described}
+        views = {name: LayerView(self._present, self.name, name) for name in layers_of(self._strands)}
         return ByName(f"layers of {self.name}", views)
 
 
@@ -121,12 +125,17 @@ class LayerView:
         Of its section [m], shape (nodes,).
     """
 
-    def __init__(self, present: Present, layer: Strand):
-        self._present, self._layer, self.name = present, layer, layer.name
+    def __init__(self, present: Present, rod: str, layer: str):
+        self._present, self._of, self.name = present, (rod, layer), f"{rod}/{layer}"
 
     def __repr__(self) -> str:
         strain = self.strain
         return f"layer {self.name}: {len(strain)} nodes, strain {strain.min():.4g} to {strain.max():.4g}"
+
+    @property
+    def _layer(self) -> Strand:
+        rod, layer = self._of
+        return layers_of(s for s in self._present.model.strands if s.rod == rod)[layer]
 
     @property
     def strain(self) -> Array:
@@ -148,11 +157,10 @@ class LayerView:
 
 def rod_views(present: Present) -> ByName[RodView]:
     """Return every rod by name; copies of a pattern are rods of their own."""
-    return ByName("rods", {name: RodView(present, name, own) for name, own in _strands_of(present.model).items()})
+    names = dict.fromkeys(s.rod for s in present.model.strands)
+    return ByName("rods", {name: RodView(present, name) for name in names})
 
 
-def _strands_of(model: Model) -> dict[str, list[StrandArrays]]:
-    strands: dict[str, list[StrandArrays]] = {}
-    for s in model.strands:
-        strands.setdefault(s.rod, []).append(s)
-    return strands
+def layers_of(strands: Iterable[StrandArrays]) -> dict[str, Strand]:
+    """Return the layers of strands by name."""
+    return {layer.layer: layer for s in strands for of in [observe.strand(s)] for layer in of.layers or (of,)}
