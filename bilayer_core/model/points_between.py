@@ -16,9 +16,10 @@ from bilayer_core.contact.shapes import BOX, CYLINDER, PLANE, SPHERE
 from bilayer_core.kinematics.frame_strains import cross
 from bilayer_core.model.model import Model
 from bilayer_core.model.records.contacts import Surfaces
-from bilayer_core.model.shape_numbers import Shape
+from bilayer_core.model.shape_numbers import NUMBER, Shape, signed_distance
 
 Array = np.ndarray
+_KIND = {number: kind for kind, number in NUMBER.items()}
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,13 @@ def _faces_one(surfaces: Surfaces, s: int, x: Array, reach: Array) -> Array:
     return flat | (kind == PLANE)
 
 
+def core_of(model: Model, s: int) -> Shape:
+    """Return the core of surface s, without its rounding, in the axes of the world at the start."""
+    surfaces = model.surfaces
+    owner = np.concatenate([model.bodies.start_rotation, np.eye(3)[None]])[surfaces.body[s]]
+    return Shape(_KIND[int(surfaces.kind[s])], surfaces.size[s], 0.0, owner @ surfaces.rotation[s])
+
+
 def points_between(model: Model, s: int, centre: Array, within: float) -> Iterator[PointsBetween]:
     """Yield the points, at the start, of the nodes that surface s can meet where it has its middle at `centre`, shape
     (3,), and that may be nearer to it than `within` [m].
@@ -73,11 +81,11 @@ def points_between(model: Model, s: int, centre: Array, within: float) -> Iterat
     is_end = (edges[:, 0] == edges[:, 1]) & (section[:, 3] > 0.0)
     longest = np.linalg.norm(edge, axis=1)[edges].max(axis=1)
     reach = 1.25 * longest + surfaces.rod_points.longest
-    owner = np.concatenate([model.bodies.start_rotation, np.eye(3)[None]])[surfaces.body[s]]
-    one_face = _faces_one(surfaces, s, (x - centre) @ (owner @ surfaces.rotation[s]), reach)
+    core = core_of(model, s)
+    one_face = _faces_one(surfaces, s, (x - centre) @ core.rotation, reach)
     one_face &= (surfaces.kind[s] == PLANE) | (longest <= surfaces.coarsest)
     is_plane = surfaces.kind[s] == PLANE
-    is_near = is_plane | (np.linalg.norm(x - centre, axis=1) < within + surfaces.bound[s] + section[:, 0] + reach)
+    is_near = signed_distance(core, x - centre) - surfaces.rounding[s] < within + section[:, 0] + reach
     for i in np.flatnonzero(meets[edges].any(axis=1) & surfaces.node_between[s] & is_near).tolist():
         (b, a), single = edges[i], False
         if is_end[i]:

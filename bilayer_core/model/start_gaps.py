@@ -15,16 +15,15 @@ from bilayer_core.model.contact_points import contact_point_names, start_contact
 from bilayer_core.model.findings import told
 from bilayer_core.model.implausible_numbers import implausible_numbers
 from bilayer_core.model.model import Model
-from bilayer_core.model.points_between import points_between
+from bilayer_core.model.points_between import core_of, points_between
 from bilayer_core.model.rod_surfaces import NearPairs
-from bilayer_core.model.shape_numbers import NUMBER, Shape, signed_distance
+from bilayer_core.model.shape_numbers import signed_distance
 
 Array = np.ndarray
 MOST_SHOWN = 1_000_000
 """Of places of rods within the barrier distance: among how many the deepest is looked for."""
 ROUNDING = 1e-9
 """Of the radii of two rods: a gap that is no more than that is none."""
-_KIND = {number: kind for kind, number in NUMBER.items()}
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ def surface_gaps(model: Model, within: float) -> Iterator[SurfaceGaps]:
     if surfaces.rod_points.exists:
         node[surfaces.rod_points.first :] = surfaces.rod_points.node
     for s in range(len(model.surface_names)):
-        core = Shape(_KIND[int(surfaces.kind[s])], surfaces.size[s], 0.0, rotation[s] @ surfaces.rotation[s])
+        core = core_of(model, s)
         origin = base[s] + rotation[s] @ surfaces.position[s]
         meets = surfaces.can_collide[s][surfaces.group]
         weight = np.where(of_rods & surfaces.node_between[s][node], 0.0, surfaces.weight)
