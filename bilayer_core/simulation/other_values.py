@@ -25,8 +25,8 @@ FREE = ("materials", "gravity", "damping")
 SECTIONS = ("width", "radius", "inner_radius", "layers")
 """And those of its rods."""
 ALLOWED = "allowed are materials, layers and sections of rods, gravity and damping"
-ANEW = {"account", "law_force", "touched", "strain_rate", "strain_acceleration"}
-"""Parts of a state that follow from others, or nearly so."""
+ANEW = {"account", "law_force", "touched", "strain_rate", "strain_acceleration", "fluid_excess", "fluid_force"}
+"""Parts of a state that follow from others, or nearly so: they may have other sizes."""
 
 
 def state_with(model: Model, other: Model, state: State, start: State) -> State:
@@ -43,6 +43,8 @@ def state_with(model: Model, other: Model, state: State, start: State) -> State:
         raise InputError(f"set_values: {', '.join(differ)} would change; {ALLOWED}; else make a new Simulator")
     if not np.array_equal(model.drives.field_channel, other.drives.field_channel):
         raise InputError(f"set_values: layers would follow other stimuli; {ALLOWED}; else make a new Simulator")
+    if model.strain_count != other.strain_count:
+        raise InputError("set_values: retardation_time: rods would get or lose viscosity; make a new Simulator")
     found = start.copy()
     for name in PARTS:
         mine, part = getattr(found, name), getattr(state, name)

@@ -135,6 +135,7 @@ def test_a_robot_on_the_ground_goes_on_with_other_values_as_one_that_takes_its_s
     [
         ({"rods.strip.path.length": 0.2}, "rods would change; allowed are materials, layers and sections of rods"),
         ({"duration": 3.0}, "duration would change"),
+        ({f"materials.{of}.retardation_time": 0.1 for of in ("active", "passive")}, "rods would get or lose viscosity"),
         ({f"{GAIN}": SLOPING | {"value": [0]}}, "must be as many as `at`, 2"),
         ({f"{GAIN}": -3}, "must leave the layer a length"),
         ({f"{STRIP}passive.fibres": {"angle": "20 deg"}}, "fibres turn the rod out of the plane"),
