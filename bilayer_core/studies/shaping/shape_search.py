@@ -269,7 +269,7 @@ class _Search(ShapedRod):
         """Go to the best pattern, and return why the search ended there.
 
         Values of palettes are chosen from a linear problem, in which they may come out worse beside others that vary
-        than alone. So they are sought alone as well, before the others follow.
+        than alone. So they are sought alone as well, beside what the scene gives the others, before these follow.
         """
         start, palette, every = self.kept(), self.pattern.in_palette, self._moving
         ended = self._searched()
@@ -277,10 +277,12 @@ class _Search(ShapedRod):
             return ended
         best, least = self.kept(), self._left(self.targets)
         self.return_to(start)
-        with contextlib.suppress(SimulationError):
-            self._moving = palette
-            self._searched()
-            self._improve_some(~palette, FEW_STEPS)
+        alone = np.where(palette, self.values, np.concatenate([v.start for v in self.varied]))
+        if np.array_equal(alone, self.values) or math.isfinite(self._left_with(alone, self.targets)):
+            with contextlib.suppress(SimulationError):
+                self._moving = palette
+                self._searched()
+                self._improve_some(~palette, FEW_STEPS)
         self._moving = every
         if not self._left(self.targets) < least:
             self.return_to(best)
