@@ -269,23 +269,28 @@ class _Search(ShapedRod):
         """Go to the best pattern, and return why the search ended there.
 
         Values of palettes are chosen from a linear problem, in which they may come out worse beside others that vary
-        than alone. So they are sought alone as well, beside what the scene gives the others, before these follow.
+        than alone. So they are sought alone as well, beside the others as they are and as the scene
+        gives them, before these follow.
         """
         start, palette, every = self.kept(), self.pattern.in_palette, self._moving
         ended = self._searched()
         if palette.all() or not palette.any():
             return ended
         best, least = self.kept(), self._left(self.targets)
-        self.return_to(start)
-        alone = np.where(palette, self.values, np.concatenate([v.start for v in self.varied]))
-        if np.array_equal(alone, self.values) or math.isfinite(self._left_with(alone, self.targets)):
+        given = np.where(palette, start[0], np.concatenate([v.start for v in self.varied]))
+        for values in [start[0], given][: 1 if np.array_equal(given, start[0]) else 2]:
+            self.return_to(start)
+            self._moving = palette
             with contextlib.suppress(SimulationError):
-                self._moving = palette
+                if values is given:
+                    self.values = given
+                    self.go(given)
                 self._searched()
                 self._improve_some(~palette, FEW_STEPS)
+                if (left := self._left(self.targets)) < least:
+                    best, least = self.kept(), left
         self._moving = every
-        if not self._left(self.targets) < least:
-            self.return_to(best)
+        self.return_to(best)
         self._improve_some(~palette, MOST_STEPS)
         return ended
 
