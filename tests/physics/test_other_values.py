@@ -5,6 +5,7 @@ import pytest
 
 from bilayer_core import Simulator, load_scene
 from bilayer_core.errors import InputError, SceneError
+from bilayer_core.log.run.memory import MemoryRecorder
 
 STRIP = "rods.strip.layers."
 GAIN, THICKNESS = f"{STRIP}active.eigenstrain.gain", f"{STRIP}active.thickness"
@@ -161,3 +162,22 @@ def test_a_run_before_other_values_is_not_differentiated_with_them():
     simulator.set_values(VALUES["gain"])
     with pytest.raises(InputError, match="other values than in the run; differentiate before set_values"):
         run.gradient("com", GAIN)
+
+
+def test_values_are_refused_while_somebody_looks_and_taken_after():
+    simulator = strip()
+    detach = simulator.attach(MemoryRecorder())
+    with pytest.raises(InputError, match="not while a log or an observer is attached"):
+        simulator.set_values(VALUES["width"])
+    detach()
+    simulator.set_values(VALUES["width"])
+    assert simulator.rods["strip"].layers["active"].width[0] == 0.02
+
+
+def test_fifty_changes_there_and_back_leave_a_strip_where_it_was():
+    simulator = strip()
+    simulator.solve_static()
+    before = simulator.positions
+    for thickness in [1.5e-3, 1e-3] * 25:
+        simulator.set_values({THICKNESS: thickness})
+    assert np.abs(simulator.positions - before).max() < 1e-9
