@@ -30,6 +30,7 @@ WIDTH = 140
 @click.option("--sigma", multiple=True, metavar="QUANTITY=VALUE", help="Noise of a column; estimated if there is none.")
 @set_option
 @click.option("--dt", metavar="TIME", help="Fixed steps of this length, of which all times are multiples.")
+@click.option("--starts", default=1, show_default=True, help="Places from which to go to the nearest minimum.")
 @click.option("--out", metavar="DIR", help="Write report, residuals, picture and the scene with the fitted values.")
 @json_option("Write the report")
 @click.option("--force", is_flag=True, help="Replace existing files.")
@@ -41,6 +42,7 @@ def fit(
     sigma: tuple[str, ...],
     overrides: tuple[str, ...],
     dt: str | None,
+    starts: int,
     out: str | None,
     json_file: str | None,
     force: bool,
@@ -63,7 +65,14 @@ def fit(
     with json_to(json_file) as write_json:
         compile_kernels(quiet)
         found = fit_scene(
-            scene, data, parameters, sigma=sigma, overrides=overrides, dt=dt, progress=None if quiet else _tell
+            scene,
+            data,
+            parameters,
+            sigma=sigma,
+            overrides=overrides,
+            dt=dt,
+            starts=starts,
+            progress=None if quiet else _tell,
         )
         report = json.dumps(outputs.report_of(found), indent=2, allow_nan=False)
         _print(found)

@@ -258,3 +258,21 @@ def test_the_package_offers_the_function_after_its_parts_were_imported():
 def test_a_parameter_that_was_not_fitted_is_told_with_the_nearest_name(found):
     with pytest.raises(UnknownName, match=r"did you mean materials\.gel\.youngs_modulus\?"):
         found["materials.gel.youngs_module"]
+
+
+@pytest.mark.slow
+def test_the_least_of_several_minima_is_found_from_several_starts():
+    modulus, swing = "materials.gel.youngs_modulus", load_scene("cantilever", {"duration": 1.0, "solver.dt": 4e-3})
+    late = np.arange(0.52, 1.0, 0.04)  # after so many periods that others fit nearly as well
+    wanted = swing.materials["gel"].youngs_modulus
+    data = data_of(load_scene(swing, {"solver.tolerance": None}), late, ["rod/strip/position[-1].z"])
+    near, least = (fit(swing, data, {modulus: (3e5, 5e6, 5e5)}, dt=4e-3, starts=starts) for starts in (1, 5))
+    assert near.converged and abs(near.values[modulus] - wanted) > 0.2 * wanted
+    assert least.values[modulus] == pytest.approx(wanted, rel=1e-4)
+    assert "of 5 starts end there" in least.termination and least.runs > near.runs
+
+
+@pytest.mark.parametrize("starts", [0, 101, 2.0, True])
+def test_a_number_of_starts_that_is_none_is_refused(exact, starts):
+    with pytest.raises(InputError, match=r"starts: .* is not allowed; it must be a whole number from 1 to 100"):
+        fit(SCENE, exact, PARAMETERS, starts=starts)

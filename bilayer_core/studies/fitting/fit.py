@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,8 @@ DOUBTFUL = 0.01
 """Probability of the residuals below which the fit warns that the model or the noise is not what it was taken for."""
 ROUGH = "runs change roughly with parameters"
 SMOOTHER = "fixed steps (--dt) or a smaller solver.tolerance may help, or data of times before bodies bounce"
+MOST_STARTS, SAME = 100, 0.01
+"""Of descents, and how far ends may be apart that are one minimum, as a part of the way between bounds."""
 NOISY, RESOLVED = 0.3, 1e-6
 """Numerical noise, in that of the data and in their spread, from which on the fit warns of it."""
 
@@ -43,6 +46,7 @@ def fit(
     sigma: Sequence[str] | Mapping[str, float | str] = (),
     overrides: Overrides = (),
     dt: float | str | None = None,
+    starts: int = 1,
     progress: Callable[[str], None] | None = None,
 ) -> FitResult:
     """Find the values of parameters of a scene with which its run agrees best with data, by least squares.
@@ -63,6 +67,9 @@ def fit(
         As `load_scene` takes them.
     dt : float or str, optional
         Fixed steps of this length; by default what the scene says, adaptive ones as a rule.
+    starts : int
+        Places from which to go to the nearest minimum, of which the least one counts: the start of the parameters, and
+        others spread over their bounds.
     progress : callable, optional
         Called with a line of text now and then.
 
@@ -79,6 +86,8 @@ def fit(
     SimulationError
         If a run cannot go on with the start values, or near the solution; its message has the values.
     """
+    if isinstance(starts, bool) or not isinstance(starts, int) or not 1 <= starts <= MOST_STARTS:
+        raise InputError(f"starts: {starts!r} is not allowed; it must be a whole number from 1 to {MOST_STARTS}")
     config = _configured(scene, overrides, dt)
     simulator = Simulator(config)
     known, nodes = known_quantities(simulator)
@@ -86,7 +95,7 @@ def fit(
     check_times(simulator, measured)
     sought = read_parameters(config, parameters)
     _refuse_few(measured, sought)
-    return _Search(config, measured, sought, progress).result()
+    return _Search(config, measured, sought, progress).result(starts)
 
 
 def _configured(scene: Any, overrides: Overrides, dt: float | str | None) -> SceneConfig:
@@ -116,8 +125,8 @@ class _Search:
         self._steps: list[Step] = []
         self._iterations = 0
 
-    def result(self) -> FitResult:
-        """Return the fit."""
+    def result(self, starts: int) -> FitResult:
+        """Return the best fit of those from so many starts."""
         start = np.array([p.part(p.start) for p in self._parameters])
         started = self._runs.evaluate(start)
         self._progress(f"start: {self._agreement(self._residuals(started))}")
@@ -126,9 +135,24 @@ class _Search:
         matrix = self._jacobian(start)
         refuse_without_influence(self._parameters, matrix)
         self._refuse_unseen(start, matrix, "at the start")
-        known = self._data.sigma is not None
-        found = descend(self._objective, self._derivatives, start, 1.0 if known else None)
-        return self._concluded(found, started)
+        return self._concluded(self._descended([start, *_spread(starts - 1, start.size)]), started)
+
+    def _descended(self, starts: list[Array]) -> Descent:
+        """Return the descent to the least of the minima that are near starts; what of them cannot run is left out."""
+        noise, found = 1.0 if self._data.sigma is not None else None, []
+        for start in starts:
+            try:
+                found.append(descend(self._objective, self._derivatives, start, noise))
+            except BilayerError as error:
+                if not found:
+                    raise
+                self._progress(f"left a start out: {error}")
+        sizes = [float(np.linalg.norm(of.residuals)) for of in found]
+        best = found[int(np.argmin(sizes))]
+        if len(starts) == 1:
+            return best
+        near = sum(bool(np.abs(of.parts - best.parts).max() <= SAME) for of in found)
+        return replace(best, termination=f"{best.termination}; {near} of {len(starts)} starts end there")
 
     def _residuals(self, values: Array) -> Array:
         """Return fit less data, weighted, shape (residuals,)."""
@@ -244,6 +268,14 @@ class _Search:
             own = noise / self._weights[here, k] if sigma is None else sigma[here, k]
             found[column.name] = float(np.sqrt(np.mean(own**2)))
         return found
+
+
+def _spread(count: int, size: int) -> Array:
+    """Return so many places spread over all that may be, in parts of the way between bounds, shape (count, size)."""
+    from scipy.stats import qmc  # takes half a second
+
+    found: Array = qmc.Halton(size, scramble=False).random(count + 1)[1:]  # without the corner
+    return found
 
 
 def _weights(data: Data) -> Array:
